@@ -1,0 +1,1 @@
+"""Generalising pouring between containers by warped parameters (Brandl, Kroemer and Peters, Humanoids 2014)."""

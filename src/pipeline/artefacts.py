@@ -1,0 +1,108 @@
+"""The only reader and writer of the project's tables, meshes and JSON files: one schema a table, atomic writes."""
+
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from pipeline.errors import PipelineError
+from pipeline.schemas import TABLES
+
+Mesh = tuple[np.ndarray, np.ndarray]
+
+
+@contextmanager
+def replacing(path: str | Path) -> Iterator[Path]:
+    """Yield a temporary name beside `path` with the same suffix; it takes the place of `path` when all went well."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_table(path: str | Path, frame: pd.DataFrame, table: str) -> None:
+    """Write `frame` as zstd Parquet; its columns must be those of `TABLES[table]`, in any order."""
+    schema = TABLES[table]
+    _check_columns(path, table, list(frame.columns))
+    try:
+        arrow = pa.Table.from_pandas(frame[schema.names], schema=schema, preserve_index=False)
+    except (pa.ArrowInvalid, pa.ArrowTypeError) as error:
+        raise PipelineError(f"{path}: a column does not fit the schema of table '{table}': {error}") from error
+    with replacing(path) as temporary:
+        pq.write_table(arrow.replace_schema_metadata(None), temporary, compression="zstd")
+
+
+def read_table(path: str | Path, table: str, columns: list[str] | None = None) -> pd.DataFrame:
+    """Read a Parquet file as table `table` (all columns, or the named ones)."""
+    try:
+        names = pq.read_schema(path).names
+        _check_columns(path, table, names)
+        return pq.read_table(path, columns=columns).to_pandas()
+    except (OSError, pa.ArrowInvalid) as error:
+        raise PipelineError(f"{path}: expected a Parquet table '{table}', but it cannot be read: {error}") from error
+
+
+def _check_columns(path: str | Path, table: str, found: list[str]) -> None:
+    expected = TABLES[table].names
+    missing = [name for name in expected if name not in found]
+    extra = [name for name in found if name not in expected]
+    if missing or extra:
+        raise PipelineError(
+            f"{path}: table '{table}' should have the columns {' '.join(expected)}; "
+            f"missing: {' '.join(missing) or 'none'}, unexpected: {' '.join(extra) or 'none'}"
+        )
+
+
+def write_json(path: str | Path, content: Any) -> None:
+    """Write `content` as indented JSON with sorted keys; NaN is refused."""
+    with replacing(path) as temporary:
+        temporary.write_text(json.dumps(content, indent=2, sort_keys=True, allow_nan=False) + "\n")
+
+
+def read_json(path: str | Path) -> Any:
+    """Read a JSON file."""
+    try:
+        return json.loads(Path(path).read_text())
+    except (OSError, ValueError) as error:
+        raise PipelineError(f"{path}: expected a JSON file, but it cannot be read: {error}") from error
+
+
+def write_mesh(path: str | Path, mesh: Mesh) -> None:
+    """Write (vertices (V, 3) in metres, triangles (F, 3)) as binary PLY."""
+    import trimesh
+
+    vertices, triangles = mesh
+    with replacing(path) as temporary:
+        trimesh.Trimesh(vertices, triangles, process=False).export(temporary, file_type="ply")
+
+
+def read_mesh(path: str | Path) -> Mesh:
+    """Read a mesh written by `write_mesh`: vertices (V, 3) in metres, triangles (F, 3)."""
+    import trimesh
+
+    try:
+        mesh = trimesh.load_mesh(path, process=False)
+    except (OSError, ValueError) as error:
+        raise PipelineError(f"{path}: expected a mesh, but it cannot be read: {error}") from error
+    return np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64)
+
+
+def points(frame: pd.DataFrame) -> np.ndarray:
+    """Return the columns x_m, y_m, z_m as an array (N, 3) in metres."""
+    return frame[["x_m", "y_m", "z_m"]].to_numpy(float)
+
+
+def normals(frame: pd.DataFrame) -> np.ndarray:
+    """Return the columns nx, ny, nz as an array (N, 3) of unit vectors."""
+    return frame[["nx", "ny", "nz"]].to_numpy(float)

@@ -1,0 +1,44 @@
+"""What every stage's `python -m pipeline.<stage>` shares: options, errors as one sentence, progress lines."""
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
+from typing import TypeVar
+
+from pipeline.errors import PipelineError
+
+T = TypeVar("T")
+
+
+def parser(doc: str | None) -> argparse.ArgumentParser:
+    """Return an option parser that shows `doc` and every default, and takes options in full only."""
+    return argparse.ArgumentParser(
+        description=doc, formatter_class=argparse.ArgumentDefaultsHelpFormatter, allow_abbrev=False
+    )
+
+
+def run(main: Callable[[], None]) -> None:
+    """Call `main`; a `PipelineError` ends the program with its one sentence on stderr and exit code 1."""
+    try:
+        main()
+    except PipelineError as error:
+        say(f"error: {error}")
+        sys.exit(1)
+
+
+def say(message: str) -> None:
+    """Write one line to stderr, where the workflow's logs come from."""
+    sys.stderr.write(f"{message}\n")
+    sys.stderr.flush()
+
+
+def progress(items: Iterable[T], total: int, what: str, every_s: float = 5.0) -> Iterator[T]:
+    """Yield `items`, saying every few seconds how many of `total` are done, the rate and the time left."""
+    start = said = time.monotonic()
+    for done, item in enumerate(items):
+        now = time.monotonic()
+        if now - said >= every_s and done:
+            said, rate = now, done / (now - start)
+            say(f"{what}: {done}/{total} ({rate:.1f}/s, {(total - done) / rate:.0f} s left)")
+        yield item

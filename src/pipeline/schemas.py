@@ -1,0 +1,77 @@
+"""The columns of every table. Units and frames are in the names; poses are 4×4 matrices, row by row."""
+
+import pyarrow as pa
+
+_POINT = [(name, pa.float64()) for name in ("x_m", "y_m", "z_m", "nx", "ny", "nz")]
+_PARTS = [(name, pa.bool_()) for name in ("container", "rim", "handle")]
+_POSE = pa.list_(pa.float64(), 16)
+
+
+def _floats(*names: str) -> list[tuple[str, pa.DataType]]:
+    return [(name, pa.float64()) for name in names]
+
+
+def _integers(*names: str) -> list[tuple[str, pa.DataType]]:
+    return [(name, pa.int64()) for name in names]
+
+
+def _strings(*names: str) -> list[tuple[str, pa.DataType]]:
+    return [(name, pa.string()) for name in names]
+
+
+_CURVE = _strings("experiment", "features", "split", "training_object") + _integers("draw")
+
+TABLES = {
+    # Points that a human labelled, in the frame of the scan (world).
+    "annotation": pa.schema(_floats("x_m", "y_m", "z_m") + _PARTS),
+    # Uniform points on the fused surface, object frame; `seen`: by a camera (the closed underside is not).
+    "cloud": pa.schema([*_POINT, ("area_m2", pa.float64()), ("seen", pa.bool_())]),
+    # The same points with the initial estimate of their parts.
+    "labels": pa.schema([*_POINT, *_floats("p_container", "p_rim", "p_handle"), *_PARTS]),
+    # Warped points in the target's object frame; indices are rows of the source's and the target's cloud.
+    "mapping": pa.schema([*_POINT, *_PARTS, *_integers("source_index", "target_index"), ("valid", pa.bool_())]),
+    # Warped parameters, one row an (object, mapping); the lip is that of the cup alone.
+    "parameters": pa.schema(
+        _strings("object", "mapping")
+        + _floats(
+            *("radius_m", "volume_m3", "height_m", "tilt_reference_rad", "capacity_m3"),
+            *("opening_x_m", "opening_y_m", "opening_z_m", "lip_x_m", "lip_y_m", "lip_z_m"),
+            *("centre_x_m", "centre_y_m", "centre_z_m"),
+        )
+    ),
+    # The tilt reference with the lip at each rim point, object frame.
+    "tilt_references": pa.schema(_strings("object", "mapping") + _floats("x_m", "y_m", "z_m", "tilt_reference_rad")),
+    # Trials. Lip: held object's frame. Tilt axis: world. Poses: before tilting. dx along the pour, dy across, dz up,
+    # lip relative to the centre of the second's opening. Filling alone: second_fill_m3, d*_m, T_world_second.
+    # `half`: how the second was filled (filling) or `capacity` (pouring).
+    "trials": pa.schema(
+        _integers("trial", "seed")
+        + _strings("experiment", "object", "held_object", "half")
+        + _floats("fill_m3", "second_fill_m3", "tilt_rad", "lip_x_m", "lip_y_m", "lip_z_m")
+        + _floats("axis_x", "axis_y", "axis_z", "dx_m", "dy_m", "dz_m")
+        + [("T_world_held", _POSE), ("T_world_second", _POSE)]
+        + _integers("n_particles", "n_second", "n_left", "n_retained", "n_spilled", "n_leaked", "n_void")
+        + _floats("density_error", "hydrostatic_margin")
+        + [("poured", pa.bool_()), ("filled", pa.bool_()), ("failed", pa.bool_())]
+    ),
+    # One row a tested trial of a classifier; `trial` counts within `test_object`.
+    "predictions": pa.schema(
+        [
+            *((name, pa.dictionary(pa.int8(), pa.string())) for name in ("experiment", "features", "split")),
+            *((name, pa.dictionary(pa.int8(), pa.string())) for name in ("training_object", "test_object")),
+            ("draw", pa.int16()),
+            ("trial", pa.int16()),
+            ("probability", pa.float32()),
+            ("label", pa.bool_()),
+        ]
+    ),
+    # One row a classifier and split; features `hydrostatic` is the ceiling (no training, draw 0).
+    "scores": pa.schema(
+        _CURVE
+        + _floats("auc", "tpr_at_fpr_00", "tpr_at_fpr_01", "tpr_at_fpr_05", "brier")
+        + _integers("n_test", "n_positive", "n_iterations", "n_redrawn")
+        + [("separable", pa.bool_()), ("converged", pa.bool_())]
+    ),
+    # ROC curves at fixed false positive rates.
+    "curves": pa.schema(_CURVE + _floats("fpr", "tpr")),
+}
