@@ -38,7 +38,9 @@ def write_table(path: str | Path, frame: pd.DataFrame, table: str) -> None:
     try:
         arrow = pa.Table.from_pandas(frame[schema.names], schema=schema, preserve_index=False)
     except (pa.ArrowInvalid, pa.ArrowTypeError) as error:
-        raise PipelineError(f"{path}: a column does not fit the schema of table '{table}': {error}") from error
+        raise PipelineError(
+            f"{path}: a column does not fit the schema of table '{table}': {error}"
+        ) from error
     with replacing(path) as temporary:
         pq.write_table(arrow.replace_schema_metadata(None), temporary, compression="zstd")
 
@@ -50,7 +52,9 @@ def read_table(path: str | Path, table: str, columns: list[str] | None = None) -
         _check_columns(path, table, names)
         return pq.read_table(path, columns=columns).to_pandas()
     except (OSError, pa.ArrowInvalid) as error:
-        raise PipelineError(f"{path}: expected a Parquet table '{table}', but it cannot be read: {error}") from error
+        raise PipelineError(
+            f"{path}: expected a Parquet table '{table}', but it cannot be read: {error}"
+        ) from error
 
 
 def _check_columns(path: str | Path, table: str, found: list[str]) -> None:

@@ -3,6 +3,7 @@
 import pyarrow as pa
 
 _POINT = [(name, pa.float64()) for name in ("x_m", "y_m", "z_m", "nx", "ny", "nz")]
+_SAMPLE = [("area_m2", pa.float64()), ("seen", pa.bool_())]
 _PARTS = [(name, pa.bool_()) for name in ("container", "rim", "handle")]
 _POSE = pa.list_(pa.float64(), 16)
 
@@ -24,12 +25,23 @@ _CURVE = _strings("experiment", "features", "split", "training_object") + _integ
 TABLES = {
     # Points that a human labelled, in the frame of the scan (world).
     "annotation": pa.schema(_floats("x_m", "y_m", "z_m") + _PARTS),
+    # Uniform points on the true surface of a demonstration object, its own frame; `inner`: faces the cavity.
+    "truth": pa.schema([*_POINT, *_PARTS, ("inner", pa.bool_())]),
     # Uniform points on the fused surface, object frame; `seen`: by a camera (the closed underside is not).
-    "cloud": pa.schema([*_POINT, ("area_m2", pa.float64()), ("seen", pa.bool_())]),
+    "cloud": pa.schema([*_POINT, *_SAMPLE]),
     # The same points with the initial estimate of their parts.
-    "labels": pa.schema([*_POINT, *_floats("p_container", "p_rim", "p_handle"), *_PARTS]),
-    # Warped points in the target's object frame; indices are rows of the source's and the target's cloud.
-    "mapping": pa.schema([*_POINT, *_PARTS, *_integers("source_index", "target_index"), ("valid", pa.bool_())]),
+    "labels": pa.schema([*_POINT, *_SAMPLE, *_floats("p_container", "p_rim", "p_handle"), *_PARTS]),
+    # Warped points in the target's object frame; indices are rows of the source's and the target's cloud. The area is
+    # that of the surface around a point, after the warp.
+    "mapping": pa.schema(
+        [
+            *_POINT,
+            ("area_m2", pa.float64()),
+            *_PARTS,
+            *_integers("source_index", "target_index"),
+            ("valid", pa.bool_()),
+        ]
+    ),
     # Warped parameters, one row an (object, mapping); the lip is that of the cup alone.
     "parameters": pa.schema(
         _strings("object", "mapping")
@@ -40,7 +52,9 @@ TABLES = {
         )
     ),
     # The tilt reference with the lip at each rim point, object frame.
-    "tilt_references": pa.schema(_strings("object", "mapping") + _floats("x_m", "y_m", "z_m", "tilt_reference_rad")),
+    "tilt_references": pa.schema(
+        _strings("object", "mapping") + _floats("x_m", "y_m", "z_m", "tilt_reference_rad")
+    ),
     # Trials. Lip: held object's frame. Tilt axis: world. Poses: before tilting. dx along the pour, dy across, dz up,
     # lip relative to the centre of the second's opening. Filling alone: second_fill_m3, d*_m, T_world_second.
     # `half`: how the second was filled (filling) or `capacity` (pouring).

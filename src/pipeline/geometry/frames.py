@@ -33,7 +33,9 @@ def rotation_about(axis: np.ndarray, angle_rad: float) -> np.ndarray:
     return np.eye(3) + np.sin(angle_rad) * K + (1.0 - np.cos(angle_rad)) * (K @ K)
 
 
-def tilted(T_world_body: np.ndarray, pivot_world: np.ndarray, axis_world: np.ndarray, angle_rad: float) -> np.ndarray:
+def tilted(
+    T_world_body: np.ndarray, pivot_world: np.ndarray, axis_world: np.ndarray, angle_rad: float
+) -> np.ndarray:
     """Return the pose of a body after a rotation about the axis (3,) through the pivot (3,), both in the world."""
     R = rotation_about(axis_world, angle_rad)
     return transform(R, pivot_world - R @ pivot_world) @ T_world_body

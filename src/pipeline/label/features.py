@@ -1,0 +1,28 @@
+"""What the neighbourhood of a point looks like (section II-B)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+
+def neighbourhood_features(points_m: np.ndarray, neighbours: Sequence[int]) -> np.ndarray:
+    """Return features (N, 4 × len(neighbours)) of points (N, 3) that sample a surface uniformly.
+
+    For each number k of neighbours: the square roots of the eigenvalues of the covariance matrix of the k nearest
+    points, in falling order, and the distance from the point to their mean; all divided by the distance to the
+    furthest of them. On a uniform cloud of a fixed number of points, k points are a fixed share of the surface: the
+    neighbourhoods grow with the object and the features are free of units.
+    """
+    distance, index = cKDTree(points_m).query(points_m, k=max(neighbours))
+    columns = [_features(points_m, points_m[index[:, :k]], distance[:, k - 1 : k]) for k in neighbours]
+    return np.hstack(columns)
+
+
+def _features(points_m: np.ndarray, around_m: np.ndarray, radius_m: np.ndarray) -> np.ndarray:
+    mean = around_m.mean(axis=1)
+    centred = around_m - mean[:, None]
+    covariance = np.einsum("nki,nkj->nij", centred, centred) / around_m.shape[1]
+    spread = np.sqrt(np.clip(np.linalg.eigvalsh(covariance)[:, ::-1], 0.0, None))
+    offset = np.linalg.norm(points_m - mean, axis=1, keepdims=True)
+    return np.hstack([spread, offset]) / radius_m

@@ -1,0 +1,113 @@
+"""How near fusion, labels and parameters come to the truth about the demonstration objects: the truth's only reader."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from pipeline.artefacts import normals, points, read_json, read_mesh, read_table
+from pipeline.geometry import frames, hulls
+from pipeline.geometry.cavity import cavity
+from pipeline.geometry.surface import Surface
+
+PARTS = ("container", "rim", "handle")
+SCALARS = {"radius": "radius_m", "height": "height_m", "capacity": "capacity_m3", "hull_volume": "volume_m3"}
+
+
+@dataclass(frozen=True)
+class Truth:
+    """A demonstration object as it is: facts, points on its surface, and where the fused object is in its frame."""
+
+    facts: dict
+    cloud: pd.DataFrame
+    mesh: tuple[np.ndarray, np.ndarray]
+    T_truth_object: np.ndarray
+
+
+def read_truth(processed: Path, name: str) -> Truth:
+    """Read the truth of one demonstration object."""
+    folder = processed / "scan" / name
+    facts = read_json(folder / "truth.json")
+    T_object_world = np.array(read_json(processed / "fuse" / name / "fusion.json")["T_object_world"])
+    T_truth_object = frames.inverse(T_object_world @ np.array(facts["T_world_object"]))
+    return Truth(
+        facts, read_table(folder / "truth.parquet", "truth"), read_mesh(folder / "truth.ply"), T_truth_object
+    )
+
+
+def fusion_errors(processed: Path, name: str, truth: Truth) -> dict[str, float]:
+    """Return mean and 95 % distances (mm) from true points of each wall side to the fused surface, and the capacity's error.
+
+    From truth to scan: what the scan lacks counts, too.
+    """
+    vertices_m, triangles = read_mesh(processed / "fuse" / name / "mesh.ply")
+    fused = Surface(frames.apply(truth.T_truth_object, vertices_m), triangles)
+    distance_mm = fused.distance(points(truth.cloud)) * 1e3
+    inner = truth.cloud["inner"].to_numpy()
+    found_m3 = cavity(vertices_m, triangles, name=name).capacity_m3
+    return {
+        "inner_error_mm_mean": float(distance_mm[inner].mean()),
+        "outer_error_mm_mean": float(distance_mm[~inner].mean()),
+        "inner_error_mm_p95": float(np.quantile(distance_mm[inner], 0.95)),
+        "outer_error_mm_p95": float(np.quantile(distance_mm[~inner], 0.95)),
+        "capacity_relative_error": found_m3 / truth.facts["capacity_m3"] - 1.0,
+    }
+
+
+def true_parts(cloud: pd.DataFrame, truth: Truth) -> np.ndarray:
+    """Return the parts (N, 3 bool) of fused points: those of the nearest of a few true points on the same side of the wall."""
+    from scipy.spatial import cKDTree
+
+    fused_m = frames.apply(truth.T_truth_object, points(cloud))
+    facing = frames.rotate(truth.T_truth_object, normals(cloud))
+    _, near = cKDTree(points(truth.cloud)).query(fused_m, k=8)
+    agrees = np.einsum("nkc,nc->nk", normals(truth.cloud)[near], facing) > 0.0
+    first = np.take_along_axis(near, np.argmax(agrees, axis=1)[:, None], axis=1)[:, 0]
+    return truth.cloud[list(PARTS)].to_numpy(bool)[first]
+
+
+def label_scores(labels: pd.DataFrame, parts: np.ndarray) -> dict[str, float]:
+    """Return IoU and balanced accuracy of each part that has two classes on this object, and the baseline's.
+
+    The baseline calls every point container and nothing else.
+    """
+    scores: dict[str, float] = {}
+    for column, part in enumerate(PARTS):
+        true, found = parts[:, column], labels[part].to_numpy(bool)
+        if true.all() or not true.any():
+            continue
+        baseline = np.full(len(true), part == "container")
+        scores[f"{part}.iou"], scores[f"{part}.baseline_iou"] = _iou(found, true), _iou(baseline, true)
+        scores[f"{part}.balanced_accuracy"] = _balanced_accuracy(found, true)
+        scores[f"{part}.baseline_balanced_accuracy"] = _balanced_accuracy(baseline, true)
+    return scores
+
+
+def _iou(found: np.ndarray, true: np.ndarray) -> float:
+    return float((found & true).sum() / (found | true).sum())
+
+
+def _balanced_accuracy(found: np.ndarray, true: np.ndarray) -> float:
+    return float((found[true].mean() + (~found[~true]).mean()) / 2.0)
+
+
+def parameter_errors(row: pd.Series, truth: Truth) -> dict[str, float]:
+    """Return relative errors of the scalars, the opening's error (mm) and that of the tilt reference (degrees).
+
+    The tilt reference's truth is the same functional of the true hull, at the true rim point nearest to the warped lip.
+    """
+    true_value = {**truth.facts, "volume_m3": truth.facts["hull_volume_m3"]}
+    errors = {name: float(row[key] / true_value[key] - 1.0) for name, key in SCALARS.items()}
+    rim_m = points(truth.cloud[truth.cloud["rim"]])
+    opening_m = rim_m.mean(axis=0)
+    found_m, lip_m = (
+        frames.apply(truth.T_truth_object, row[[f"{what}_{axis}_m" for axis in "xyz"]].to_numpy(float))
+        for what in ("opening", "lip")
+    )
+    errors["opening_mm"] = float(np.linalg.norm(found_m - opening_m) * 1e3)
+    true_lip_m = rim_m[np.argmin(np.linalg.norm(rim_m - lip_m, axis=1))]
+    inside_m = hulls.points_in_hull(points(truth.cloud[truth.cloud["container"]]), 20000)
+    true_tilt_rad = hulls.tilt_reference_rad(inside_m, true_lip_m, opening_m)
+    errors["tilt_reference_deg"] = float(np.degrees(row["tilt_reference_rad"] - true_tilt_rad))
+    return errors

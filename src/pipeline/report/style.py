@@ -1,0 +1,40 @@
+"""What all figures share: fonts that print, one colour and one word for each feature set."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipeline.artefacts import replacing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# Okabe and Ito's colours, distinct to colour-blind readers and in grey.
+COLOURS = {
+    "label_mapping": "#0072B2",
+    "point_mapping": "#D55E00",
+    "standard": "#009E73",
+    "hydrostatic": "#7F7F7F",
+}
+WORDS = {
+    "label_mapping": "label mapping",
+    "point_mapping": "point mapping",
+    "standard": "standard features",
+    "hydrostatic": "hydrostatic ceiling",
+}
+RC = {
+    "font.size": 8,
+    "axes.labelsize": 8,
+    "axes.titlesize": 9,
+    "legend.fontsize": 7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "pdf.fonttype": 42,
+}
+
+
+def save(figure: "Figure", path: Path) -> None:
+    """Write the figure as PDF, the same bytes for the same figure."""
+    with replacing(path) as temporary:
+        figure.savefig(
+            temporary, metadata={"CreationDate": None, "Creator": "warped-pouring", "Producer": None}
+        )
