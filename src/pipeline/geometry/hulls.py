@@ -1,7 +1,7 @@
 """Convex hulls: their volume, points inside them, and the tilt that raises half of them above a lip."""
 
 import numpy as np
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, Delaunay
 from scipy.stats import qmc
 
 
@@ -21,9 +21,7 @@ def points_in_hull(points_m: np.ndarray, n: int) -> np.ndarray:
     share = hull.volume / float(np.prod(high - low))
     exponent = int(np.ceil(np.log2(n / share)))
     candidates = qmc.scale(qmc.Sobol(3, scramble=False).random_base2(exponent), low, high)
-    normals, offsets = hull.equations[:, :3].T, hull.equations[:, 3]
-    blocks = np.array_split(candidates, max(1, len(candidates) // 64))  # bounds the memory
-    return np.concatenate([block[(block @ normals + offsets <= 0.0).all(axis=1)] for block in blocks])
+    return candidates[Delaunay(points_m[hull.vertices]).find_simplex(candidates) >= 0]
 
 
 def raising_tilt_rad(points_m: np.ndarray, lip_m: np.ndarray, opening_m: np.ndarray) -> np.ndarray:

@@ -15,14 +15,14 @@ PARTS = ("container", "rim", "handle")
 
 @dataclass(frozen=True)
 class PartClassifier:
-    """Three independent classifiers of a point's neighbourhood; None for a part that the source does not have."""
+    """Three independent classifiers of a point's neighbourhood; a constant where the source is all or nothing of a part."""
 
-    models: tuple[Pipeline | None, ...]
+    models: tuple[Pipeline | float, ...]
 
     def probabilities(self, features: np.ndarray) -> np.ndarray:
         """Return p(part) of points with features (N, F) as (N, 3), in the order of `PARTS`."""
         columns = [
-            np.zeros(len(features)) if model is None else model.predict_proba(features)[:, 1]
+            np.full(len(features), model) if isinstance(model, float) else model.predict_proba(features)[:, 1]
             for model in self.models
         ]
         return np.column_stack(columns)
@@ -37,9 +37,9 @@ def train(features: np.ndarray, parts: np.ndarray, ridge: float) -> PartClassifi
     return PartClassifier(tuple(_train(features, part, ridge) for part in parts.T))
 
 
-def _train(features: np.ndarray, part: np.ndarray, ridge: float) -> Pipeline | None:
-    if not part.any():
-        return None
+def _train(features: np.ndarray, part: np.ndarray, ridge: float) -> Pipeline | float:
+    if part.all() or not part.any():
+        return float(part[0])
     regression = LogisticRegression(C=1.0 / ridge, solver="newton-cholesky", class_weight="balanced")
     return make_pipeline(StandardScaler(), regression).fit(features, part)
 

@@ -99,12 +99,12 @@ def _handle(points_m: np.ndarray, handle: np.ndarray, origin_m: np.ndarray) -> n
 
 
 def _components(points_m: np.ndarray, chosen: np.ndarray) -> list[np.ndarray]:
-    """Return the chosen points as connected components, largest first; linked over three point spacings."""
+    """Return the chosen points as connected components, largest first; linked over twice the distance to a sixth neighbour."""
     subset = points_m[chosen]
     if len(subset) == 0:
         return []
-    spacing = np.median(cKDTree(points_m).query(points_m, k=2)[0][:, 1])
-    pairs = cKDTree(subset).query_pairs(3.0 * spacing, output_type="ndarray")
+    link_m = 2.0 * np.median(cKDTree(points_m).query(points_m, k=7)[0][:, 6])
+    pairs = cKDTree(subset).query_pairs(link_m, output_type="ndarray")
     graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(subset), len(subset)))
     count, label = connected_components(graph, directed=False)
     order = np.argsort(-np.bincount(label, minlength=count), kind="stable")

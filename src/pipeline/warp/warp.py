@@ -11,6 +11,7 @@ from pipeline.warp.nearest import agreeing_neighbours, majority_of_neighbours, m
 from pipeline.warp.stretch import Stretch, between_extents, linear
 
 REFINEMENT_POINTS = 4000
+WALL_COSINE = 0.8  # a point is on a wall, not on a lip or floor, where its normal is this near to the horizontal
 
 
 @dataclass(frozen=True)
@@ -150,7 +151,7 @@ def wall_side_flips(warp: Warp, mapped: Mapped) -> float:
     rows = np.flatnonzero(mapped.valid)
     here = _facing_outward(warp.aligned, warp.target_frame)[mapped.source_index[rows]]
     there = _facing_outward(warp.target, warp.target_frame)[mapped.target_index[rows]]
-    on_wall = (np.abs(here) > 0.5) & (np.abs(there) > 0.5)
+    on_wall = (np.abs(here) > WALL_COSINE) & (np.abs(there) > WALL_COSINE)
     return float(np.mean(here[on_wall] * there[on_wall] < 0.0)) if on_wall.any() else 0.0
 
 

@@ -1,0 +1,78 @@
+import numpy as np
+import pytest
+
+from conftest import PARTS, sampled
+from pipeline.artefacts import points
+from pipeline.errors import PipelineError
+from pipeline.label.classifier import train, transfer_annotation
+from pipeline.label.features import neighbourhood_features
+from pipeline.label.paint import paint, read_strokes
+
+NEIGHBOURS = (30, 60, 150)  # of 6000 points, the shares of the surface that the default takes of 12,000
+
+
+def features(name: str) -> np.ndarray:
+    return neighbourhood_features(points(sampled(name)), NEIGHBOURS)
+
+
+def test_features_do_not_depend_on_scale_or_pose():
+    cloud = points(sampled("mug"))
+    turned = 1.7 * cloud @ np.array([[0.0, -1.0, 0.0], [0.6, 0.0, -0.8], [0.8, 0.0, 0.6]]).T + [0.3, 0.1, -0.2]
+    np.testing.assert_allclose(neighbourhood_features(turned, NEIGHBOURS), features("mug"), atol=1e-9)
+
+
+def test_features_of_the_middle_of_a_square():
+    grid = np.stack(np.meshgrid(np.arange(9.0), np.arange(9.0), [0.0]), axis=-1).reshape(-1, 3)
+    first, second, third, offset = neighbourhood_features(grid, [9])[40]
+    # Nine points of a unit grid: variance 2/3 along both sides, the furthest at √2.
+    assert first == pytest.approx(np.sqrt(2 / 3) / np.sqrt(2))
+    assert second == pytest.approx(first)
+    assert third == pytest.approx(0.0, abs=1e-7)
+    assert offset == pytest.approx(0.0, abs=1e-9)
+
+
+def test_parts_of_other_objects_are_found_from_the_source_alone():
+    classifier = train(features("mug"), sampled("mug")[PARTS].to_numpy(), ridge=300.0)
+    rim = {}
+    for name in ("short_cup", "tumbler", "wide_bowl", "jug"):
+        found = classifier.probabilities(features(name)) > 0.5
+        true = sampled(name)[PARTS].to_numpy()
+        rim[name] = (found[true[:, 1], 1].mean() + (~found[~true[:, 1], 1]).mean()) / 2
+        if name == "jug":
+            assert (found[true[:, 2], 2].mean() + (~found[~true[:, 2], 2]).mean()) / 2 > 0.85
+    assert min(rim.values()) > 0.8, rim
+    assert np.mean(list(rim.values())) > 0.9, rim
+
+
+def test_a_part_that_the_source_lacks_is_never_found():
+    parts = sampled("short_cup")[PARTS].to_numpy()
+    assert (train(features("short_cup"), parts, 300.0).probabilities(features("mug"))[:, 2] == 0.0).all()
+
+
+def test_annotation_is_carried_to_the_nearest_points():
+    cloud = sampled("mug")
+    carried = transfer_annotation(points(cloud)[::2], cloud[PARTS].to_numpy()[::2], points(cloud), name="mug")
+    assert (carried == cloud[PARTS].to_numpy()).mean() > 0.97
+
+
+def test_annotation_of_another_scan_is_refused():
+    cloud = sampled("mug")
+    with pytest.raises(PipelineError, match=r"annotation\.parquet.*0\.[0-9]+ m away"):
+        transfer_annotation(points(cloud) + 0.2, cloud[PARTS].to_numpy(), points(cloud), name="annotation.parquet")
+
+
+def test_the_last_box_that_holds_a_point_gives_its_parts(tmp_path):
+    path = tmp_path / "strokes.yaml"
+    path.write_text(
+        "- {parts: [container], low_m: [0, 0, 0], high_m: [1, 1, 1]}\n"
+        "- {parts: [container, rim], low_m: [0, 0, 0.9], high_m: [1, 1, 1]}\n"
+    )
+    found = paint(np.array([[0.5, 0.5, 0.5], [0.5, 0.5, 0.95], [2.0, 0.0, 0.0]]), read_strokes(path))
+    np.testing.assert_array_equal(found, [[True, False, False], [True, True, False], [False, False, False]])
+
+
+def test_strokes_with_an_unknown_part_are_refused_by_file(tmp_path):
+    path = tmp_path / "strokes.yaml"
+    path.write_text("- {parts: [lid], low_m: [0, 0, 0], high_m: [1, 1, 1]}\n")
+    with pytest.raises(PipelineError, match=r"strokes\.yaml.*lid"):
+        read_strokes(path)

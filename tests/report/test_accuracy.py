@@ -1,0 +1,55 @@
+"""From the ten noisy scans to warped parameters by the real workflow, against the objects' known geometry."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from pipeline.report.metrics import accuracy_metrics, warp_metrics
+
+ROOT = Path(__file__).parents[2]
+NAMES = yaml.safe_load((ROOT / "config/config.yaml").read_text())["scan"]["objects"]
+
+
+@pytest.fixture(scope="module")
+def metrics(tmp_path_factory) -> dict[str, float]:
+    folder = tmp_path_factory.mktemp("accuracy")
+    for part in ("config", "workflow", "profiles", "src"):
+        shutil.copytree(ROOT / part, folder / part)
+    shutil.copy2(ROOT / "Snakefile", folder)
+    (folder / "data/raw").mkdir(parents=True)
+    targets = [f"data/processed/warp/mug/{name}/alignment.json" for name in NAMES]
+    targets += ["data/processed/parametrise/mug/parameters.parquet"]
+    call = [sys.executable, "-m", "snakemake", "-c2", *targets, "--config", "track={enabled: false}"]
+    told = subprocess.run(call, cwd=folder, capture_output=True, text=True)
+    assert told.returncode == 0, told.stderr
+    processed = folder / "data/processed"
+    return accuracy_metrics(processed, "mug", NAMES) | warp_metrics(processed, "mug", NAMES)
+
+
+def test_fused_surfaces_are_near_the_true_ones_on_both_sides_of_the_wall(metrics):
+    for name in NAMES:
+        assert metrics[f"fuse.{name}.inner_error_mm_mean"] < 0.6, name
+        assert metrics[f"fuse.{name}.outer_error_mm_mean"] < 0.6, name
+    assert metrics["fuse.capacity.relative_error_max"] < 0.03
+
+
+def test_mapped_labels_find_the_parts_that_the_baseline_misses(metrics):
+    assert metrics["warp.label_mapping.rim.iou"] > 0.7 > metrics["warp.label_mapping.rim.baseline_iou"]
+    assert metrics["warp.label_mapping.handle.iou"] > 0.75 > metrics["warp.label_mapping.handle.baseline_iou"]
+    assert metrics["warp.label_mapping.balanced_accuracy"] > 0.9
+    assert metrics["label.balanced_accuracy"] > 0.85
+
+
+def test_no_wall_is_crossed_and_no_point_left_alone(metrics):
+    assert metrics["warp.label_mapping.wall_side_flips"] == 0.0
+    assert metrics["warp.label_mapping.share_without_candidate"] < 0.01
+
+
+def test_parameters_are_near_the_true_ones(metrics):
+    for what in ("radius", "height", "hull_volume"):
+        assert metrics[f"parametrise.label_mapping.{what}.relative_error_max"] < 0.03, what
+    assert metrics["parametrise.label_mapping.tilt_reference.error_deg_max"] < 1.5

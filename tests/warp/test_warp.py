@@ -1,0 +1,136 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from conftest import PARTS, sampled
+from pipeline.artefacts import normals, points
+from pipeline.errors import PipelineError
+from pipeline.geometry.frames import rotation_about
+from pipeline.warp.alignment import part_frame
+from pipeline.warp.nearest import agreeing_neighbours, majority_of_neighbours
+from pipeline.warp.stretch import between_extents, linear
+from pipeline.warp.warp import Cloud, fit, label_mapping, point_mapping, wall_side_flips
+
+
+def cloud(name: str) -> Cloud:
+    table = sampled(name)
+    parts = table[PARTS].to_numpy()
+    return Cloud(name, points(table), normals(table), table["area_m2"].to_numpy(), parts)
+
+
+def moved(body: Cloud, yaw_rad: float, scale: float, shift_m: tuple[float, float, float]) -> Cloud:
+    R = rotation_about(np.array([0.0, 0.0, 1.0]), yaw_rad)
+    return replace(
+        body,
+        points_m=scale * body.points_m @ R.T + shift_m,
+        normals=body.normals @ R.T,
+        area_m2=scale**2 * body.area_m2,
+    )
+
+
+def iou(found: np.ndarray, true: np.ndarray) -> float:
+    return float((found & true).sum() / (found | true).sum())
+
+
+def test_part_frame_points_to_the_rim_and_to_the_handle():
+    mug = cloud("mug")
+    turned = moved(mug, 0.7, 1.0, (0.02, -0.01, 0.0))
+    frame, other = (part_frame(body.points_m, body.parts, name="mug") for body in (mug, turned))
+    np.testing.assert_allclose(other.T_object_part[:3, 0], [0.0, 0.0, 1.0])
+    turn = np.arctan2(*other.T_object_part[1::-1, 1]) - np.arctan2(*frame.T_object_part[1::-1, 1])
+    assert turn % (2 * np.pi) == pytest.approx(0.7, abs=0.01)
+    assert frame.roll_observable
+    assert np.linalg.det(frame.T_object_part[:3, :3]) == pytest.approx(1.0)
+
+
+def test_a_round_cup_has_no_observable_roll():
+    cup = cloud("short_cup")
+    assert not part_frame(cup.points_m, cup.parts, name=cup.name).roll_observable
+
+
+def test_a_base_edge_taken_for_rim_does_not_flip_the_frame():
+    cup = cloud("short_cup")
+    parts = cup.parts.copy()
+    parts[:, 1] |= (cup.points_m[:, 2] < 0.004) & (np.linalg.norm(cup.points_m[:, :2], axis=1) > 0.03)
+    frame = part_frame(cup.points_m, parts, name=cup.name)
+    np.testing.assert_allclose(frame.T_object_part[:3, 0], [0.0, 0.0, 1.0])
+
+
+def test_an_upside_down_cup_is_named():
+    cup = cloud("short_cup")
+    with pytest.raises(PipelineError, match=r"short_cup: expected an upright container.*1[78][0-9]° from the top"):
+        part_frame(cup.points_m * [1, -1, -1], cup.parts, name=cup.name)
+
+
+def test_the_stretch_gives_the_container_the_target_s_variances():
+    source, target = cloud("mug"), cloud("wide_bowl")
+    warp = fit(source, target, refinements=0)
+    frame = warp.target_frame.T_object_part
+    spread = ((warp.aligned.points_m[source.parts[:, 0]] - frame[:3, 3]) @ frame[:3, :3]).std(axis=0)
+    np.testing.assert_allclose(spread, warp.target_frame.spread_m, rtol=1e-6)
+
+
+def test_a_kept_rim_is_moved_not_stretched():
+    stretch = between_extents(np.array([0.0, 0.1]), np.array([0.0, 0.05]), 0.004, np.ones(3))
+    heights = np.array([[0.0, 0, 0], [0.096, 0, 0], [0.1, 0, 0]])
+    np.testing.assert_allclose(stretch.map(heights)[:, 0], [0.0, 0.046, 0.05])
+    np.testing.assert_allclose(stretch.factors(heights)[[0, 2], 0], [0.046 / 0.096, 1.0])
+
+
+@pytest.mark.parametrize(("yaw_rad", "scale"), [(0.0, 1.0), (2.3, 0.5), (-1.1, 2.0)])
+def test_the_same_object_moved_and_scaled_gets_its_labels_back(yaw_rad, scale):
+    source = cloud("mug")
+    target = moved(source, yaw_rad, scale, (0.1, -0.3, 0.0))
+    mapped = label_mapping(fit(source, target, refinements=0), k=1)
+    assert (mapped.cloud.parts == source.parts).mean() > 0.999
+    np.testing.assert_array_equal(mapped.source_index, np.arange(len(source.points_m)))
+
+
+def test_normals_follow_the_inverse_transpose():
+    source = cloud("short_cup")
+    target = replace(source, points_m=source.points_m * [1.0, 1.0, 0.5])
+    aligned = fit(source, target, refinements=0).aligned
+    squeezed = source.normals / [1.0, 1.0, 0.5]
+    squeezed /= np.linalg.norm(squeezed, axis=1, keepdims=True)
+    assert np.einsum("nc,nc->n", aligned.normals, squeezed).min() > 0.999
+    # The area of a wall halves, that of a floor stays.
+    wall = np.abs(source.normals[:, 2]) < 0.05
+    assert (aligned.area_m2 / source.area_m2)[wall].mean() == pytest.approx(0.5, rel=0.01)
+
+
+@pytest.mark.parametrize("name", ["tall_cup", "tumbler", "espresso_cup", "wide_bowl", "square_bowl"])
+def test_rims_are_found_on_other_objects_and_no_wall_is_crossed(name):
+    source, target = cloud("mug"), cloud(name)
+    warp = fit(source, target, refinements=5)
+    labels, pts = label_mapping(warp, k=1), point_mapping(warp, k=1)
+    assert iou(labels.cloud.parts[:, 1], target.parts[:, 1]) > 0.6
+    assert wall_side_flips(warp, labels) == wall_side_flips(warp, pts) == 0.0
+    assert labels.valid.all()
+    assert pts.valid.all()
+
+
+def test_neighbours_across_the_wall_are_passed_over():
+    # A wall of 3 mm: the nearest point is on the other side, and a hundred more are.
+    inner = np.column_stack([np.zeros(200), np.linspace(0, 0.1, 200), np.zeros(200)])
+    outer = inner + [0.003, 0.0, 0.0]
+    facing = np.array([[-1.0, 0.0, 0.0]] * 200 + [[1.0, 0.0, 0.0]] * 200)
+    query = np.array([[0.0021, 0.05, 0.0]])
+    index, distance = agreeing_neighbours(query, np.array([[-1.0, 0.0, 0.0]]), np.vstack([inner, outer]), facing, 3)
+    assert (index < 200).all()
+    assert distance[0, 0] == pytest.approx(0.0021, abs=1e-4)
+
+
+def test_points_without_any_agreeing_normal_are_marked():
+    index, distance = agreeing_neighbours(np.zeros((1, 3)), np.eye(3)[:1], np.ones((5, 3)), -np.ones((5, 3)), 2)
+    assert (index == -1).all()
+    assert np.isinf(distance).all()
+
+
+def test_label_mapping_of_several_neighbours_takes_the_majority():
+    labels = np.array([[True], [True], [False]])
+    np.testing.assert_array_equal(majority_of_neighbours(labels, np.array([[0, 1, 2], [2, 2, 0]]))[:, 0], [True, False])
+
+
+def test_linear_stretch_scales_about_the_origin():
+    np.testing.assert_allclose(linear(np.array([2.0, 3.0, 4.0])).map(np.array([[1.0, 1, 1], [-2.0, 0, 1]])), [[2, 3, 4], [-4, 0, 4]])
