@@ -1,0 +1,32 @@
+"""Fuse one raw folder into a closed surface and evenly spaced points, the object upright on z = 0."""
+
+from pathlib import Path
+
+from pipeline.command import parser, run
+
+
+def main() -> None:
+    """Parse the options, fuse, write."""
+    options = parser(__doc__)
+    options.add_argument(
+        "--raw", type=Path, required=True, help="folder with the scan; its name is the object's"
+    )
+    options.add_argument("--mesh", type=Path, required=True, help="surface to write, PLY")
+    options.add_argument("--cloud", type=Path, required=True, help="points to write, Parquet")
+    options.add_argument("--report", type=Path, required=True, help="what was found, JSON")
+    options.add_argument("--voxel-m", type=float, default=0.001, help="edge of a voxel")
+    options.add_argument("--truncation-m", type=float, default=0.002, help="truncation distance")
+    options.add_argument("--points", type=int, default=12_000, help="points of the cloud, at least 5000")
+    options.add_argument("--seed", type=int, default=2)
+    o = options.parse_args()
+
+    from pipeline import artefacts
+    from pipeline.fuse.fusion import fused
+
+    result = fused(o.raw, voxel_m=o.voxel_m, truncation_m=o.truncation_m, n_points=o.points, seed=o.seed)
+    artefacts.write_mesh(o.mesh, result.mesh)
+    artefacts.write_table(o.cloud, result.cloud, "cloud")
+    artefacts.write_json(o.report, result.report)
+
+
+run(main)

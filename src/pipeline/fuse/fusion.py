@@ -1,0 +1,109 @@
+"""From a raw folder to the surface, the cloud and the report of what was found."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pipeline.artefacts import Mesh
+from pipeline.errors import PipelineError
+from pipeline.fuse import dropped, layouts, table, tsdf
+from pipeline.fuse.cloud import cloud
+
+LEAST_POINTS = 5000
+# A surface further than this from half of its own measurements was fused from views that do not fit together.
+LARGEST_RESIDUAL_M = 0.003
+_RESIDUAL_POINTS = 20_000
+_SMOOTH_FUSED, _SMOOTH_DROPPED = 5, 0
+
+
+@dataclass(frozen=True)
+class Fused:
+    """mesh: vertices (V, 3) and triangles (F, 3), object frame; cloud: table `cloud`; report: content of fusion.json."""
+
+    mesh: Mesh
+    cloud: pd.DataFrame
+    report: dict[str, Any]
+
+
+def fused(folder: Path, *, voxel_m: float, truncation_m: float, n_points: int, seed: int) -> Fused:
+    """Fuse data/raw/<object>/; a `PipelineError` names the folder or file that is wrong."""
+    if n_points < LEAST_POINTS:
+        raise PipelineError(f"--points: expected at least {LEAST_POINTS}, found {n_points}; set fuse.points")
+    rng = np.random.default_rng(seed)
+    raw = layouts.read(folder)
+    if isinstance(raw, layouts.DroppedMesh):
+        vertices, triangles, T_object_world = dropped.read(raw)
+        surface = tsdf.Surface(vertices, triangles, np.ones(len(vertices), bool))
+        return _result(surface, n_points, _SMOOTH_DROPPED, rng, _mesh_facts(T_object_world, raw))
+    points = table.world_points(raw)
+    eyes = np.array([T[:3, 3] for T in raw.T_world_cameras])
+    plane = table.table_plane(points, eyes, str(folder), rng)
+    placement = table.place(points, plane, str(folder))
+    surface = tsdf.fuse(raw, placement, voxel_m, truncation_m, str(folder))
+    facts = _scan_facts(raw, plane, placement, surface, str(folder), rng)
+    return _result(surface, n_points, _SMOOTH_FUSED, rng, facts)
+
+
+def _result(
+    surface: tsdf.Surface, n_points: int, smooth: int, rng: np.random.Generator, facts: dict[str, Any]
+) -> Fused:
+    import trimesh
+
+    points = cloud(surface.vertices_m, surface.triangles, surface.seen, n_points, smooth, rng)
+    mesh = trimesh.Trimesh(surface.vertices_m, surface.triangles, process=False)
+    report = {
+        "share_seen": float(points.seen.mean()),
+        "watertight": bool(mesh.is_watertight),
+        "n_triangles": len(surface.triangles),
+        "area_m2": float(mesh.area),
+    }
+    return Fused((surface.vertices_m, surface.triangles), points, facts | report)
+
+
+def _mesh_facts(T_object_world: np.ndarray, raw: layouts.DroppedMesh) -> dict[str, Any]:
+    facts = {"layout": "mesh", "n_views": 0, "unit_m": raw.options.unit_m, "table_plane_world": None}
+    return facts | {"T_object_world": T_object_world.tolist(), "table_rms_m": None, "residual_m": None}
+
+
+def _scan_facts(
+    views: layouts.Views,
+    plane: table.Plane,
+    placement: table.Placement,
+    surface: tsdf.Surface,
+    name: str,
+    rng: np.random.Generator,
+) -> dict[str, Any]:
+    measured = placement.points_m[rng.integers(len(placement.points_m), size=_RESIDUAL_POINTS)]
+    residual = _distance(surface, measured)
+    median, high = np.quantile(residual, [0.5, 0.95])
+    if median > LARGEST_RESIDUAL_M:
+        raise PipelineError(
+            f"{name}: expected measured points within {LARGEST_RESIDUAL_M * 1e3:g} mm of the fused surface, found half of them "
+            f"beyond {median * 1e3:.1f} mm; the poses do not fit the images (camera→world, in metres?)"
+        )
+    return {
+        "layout": "7-scenes",
+        "n_views": len(views.depths_m),
+        "unit_m": 1.0,
+        "T_object_world": placement.T_object_world.tolist(),
+        "table_plane_world": [*plane.normal.tolist(), plane.offset_m],
+        "table_rms_m": plane.rms_m,
+        "residual_m": {"median": float(median), "quantile_95": float(high)},
+    }
+
+
+def _distance(surface: tsdf.Surface, points_m: np.ndarray) -> np.ndarray:
+    import open3d as o3d
+
+    scene = o3d.t.geometry.RaycastingScene()
+    arrays = (
+        surface.vertices_m.astype(np.float32),
+        surface.triangles.astype(np.uint32),
+        points_m.astype(np.float32),
+    )
+    vertices, triangles, points = (o3d.core.Tensor.from_numpy(array) for array in arrays)
+    scene.add_triangles(vertices, triangles)
+    return scene.compute_distance(points).numpy().astype(float)

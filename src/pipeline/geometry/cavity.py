@@ -1,0 +1,289 @@
+"""The room for liquid in a scanned container: its inside, its rim, what it keeps when tilted.
+
+Everything is in the object's frame: upright, z up, the underside on z = 0. The mesh may have pinholes: whether a point
+is inside is decided by what encloses it and by what can be seen from there, never by the winding of triangles.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.errors import PipelineError
+from pipeline.geometry.frames import apply, rotation_about
+from pipeline.geometry.surface import Surface, subdivided
+
+AZIMUTHS = 256
+TIE_M = 0.002  # rims that are level to within this count as level (DESIGN: the lip of a cup alone)
+_RIM_STEP_M = 0.0001
+_RIM_GAP_M = 0.004  # a hole in the scan below the rim's edge may be this high
+_LEAST_M3 = 5e-6  # a container that keeps less than 5 ml is none
+
+
+@dataclass(frozen=True)
+class Cavity:
+    """A container's inside, object frame, metres.
+
+    origin_m (3,): centre of cell [0, 0, 0]. interior (nx, ny, nz): room for liquid below the rim's surface. distance_m:
+    distance of cell centres to the inner surface, positive in the open, negative beyond the wall (one-sided: the outer
+    surface does not count). rim_m (M, 3): the lip's highest edge, by azimuth about the opening, M even steps.
+    opening_m (3,): mean of the rim. capacity_m3: room below the rim's lowest point, upright.
+    """
+
+    origin_m: np.ndarray
+    cell_m: float
+    interior: np.ndarray
+    distance_m: np.ndarray
+    rim_m: np.ndarray
+    opening_m: np.ndarray
+    capacity_m3: float
+
+    def rim_at(self, x_m: np.ndarray, y_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the rim's horizontal distance from the opening and its height in the direction of (x, y)."""
+        return _rim_at(self.rim_m, self.opening_m, x_m, y_m)
+
+
+def cavity(vertices_m: np.ndarray, triangles: np.ndarray, *, name: str, cell_m: float = 0.002) -> Cavity:
+    """Find the cavity of a container's mesh: vertices (V, 3) in metres, object frame, and triangles (F, 3).
+
+    A `PipelineError` names the object when it cannot hold liquid (a plate, a closed block, a hole in the floor).
+    """
+    if len(triangles) == 0:
+        raise PipelineError(f"{name}: expected a mesh with faces, found none; scan the object again")
+    vertices_m, triangles = subdivided(np.asarray(vertices_m, float), np.asarray(triangles), 3 * cell_m)
+    surface = Surface(vertices_m, triangles)
+    axes = _axes(vertices_m, cell_m)
+    centres = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    free = surface.distance_on_grid(centres, cell_m) > cell_m
+    pool, level = _pool(free, cell_m, name)
+    rim, opening = _rim(surface, axes, pool, level, vertices_m[:, 2].max(), cell_m)
+    level_m = axes[2][level]
+    if rim[:, 2].min() - level_m > 3 * cell_m:
+        raise PipelineError(
+            f"{name}: expected a wall without holes below its rim ({rim[:, 2].min() * 1e3:.0f} mm), "
+            f"found that liquid escapes at {level_m * 1e3:.0f} mm; close the hole or exclude the object"
+        )
+    core, below = _core(free, pool, centres, rim, opening, cell_m, name)
+    interior, distance = _inside(surface, vertices_m, triangles, centres, core, below, cell_m)
+    volume = _room(distance, interior, rim, opening, tuple(np.moveaxis(centres, -1, 0)), cell_m)
+    capacity = float((volume * _share_below(rim[:, 2].min() - axes[2], cell_m)).sum() * cell_m**3)
+    origin = centres[0, 0, 0].copy()
+    return Cavity(origin, cell_m, interior, distance.astype(np.float32), rim, opening, capacity)
+
+
+def lip_alone(cup: Cavity) -> np.ndarray:
+    """Return the lip (3,) of a cup alone: the rim's lowest point; among ties the one furthest along +x."""
+    low = cup.rim_m[cup.rim_m[:, 2] <= cup.rim_m[:, 2].min() + TIE_M]
+    return low[np.argmax(low[:, 0])].copy()
+
+
+def lip_towards(cup: Cavity, T_world_held: np.ndarray, point_world: np.ndarray) -> np.ndarray:
+    """Return the lip (3,), object frame, of a held cup: the rim point nearest to a point (3,) of the world."""
+    return cup.rim_m[np.argmin(np.linalg.norm(apply(T_world_held, cup.rim_m) - point_world, axis=1))].copy()
+
+
+def pour_axis(opening: np.ndarray, lip: np.ndarray) -> np.ndarray:
+    """Return the horizontal unit axis (3,) about which a right-handed rotation tilts the lip (3,) downwards."""
+    out = np.array([lip[0] - opening[0], lip[1] - opening[1], 0.0])
+    out /= np.linalg.norm(out)
+    return np.array([-out[1], out[0], 0.0])
+
+
+def retained_volume_m3(
+    cup: Cavity, lip_m: np.ndarray, axis: np.ndarray, tilt_rad: np.ndarray | float
+) -> np.ndarray:
+    """Return what hydrostatics leaves in a brimful cup after a slow tilt about `axis` through the lip, m³.
+
+    The surface is level with the rim's lowest point. Tilts of any shape; what is lost on the way stays lost, so the
+    result never grows with the tilt. The lip itself is where the axis passes and does not change volumes.
+    """
+    tilts = np.asarray(tilt_rad, float)
+    steps = np.linspace(
+        0.0, max(float(tilts.max(initial=0.0)), 1e-3), max(2, int(tilts.max(initial=0.0) / 0.035) + 2)
+    )
+    points, volumes, cell = _quadrature(cup)
+    kept = [_volume_under(points, volumes, cell, cup.rim_m, rotation_about(axis, t)[2]) for t in steps]
+    return np.interp(tilts, steps, np.minimum.accumulate(kept))
+
+
+def room_m3(cup: Cavity) -> np.ndarray:
+    """Return the volume (nx, ny, nz) of each cell that is room for liquid below the rim's surface."""
+    return (
+        _room(cup.distance_m, cup.interior, cup.rim_m, cup.opening_m, _grids(cup), cup.cell_m) * cup.cell_m**3
+    )
+
+
+def _grids(cup: Cavity) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    x, y, z = (o + cup.cell_m * np.arange(n) for o, n in zip(cup.origin_m, cup.interior.shape, strict=True))
+    return tuple(np.meshgrid(x, y, z, indexing="ij"))
+
+
+def _quadrature(cup: Cavity) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return points (N, 3), volumes (N,) and edge of blocks of 2×2×2 cells: enough for a tilted surface."""
+    room = room_m3(cup)
+    room = np.pad(room, [(0, n % 2) for n in room.shape])
+    blocks = tuple(n // 2 for n in room.shape)
+    volumes = room.reshape(blocks[0], 2, blocks[1], 2, blocks[2], 2).sum(axis=(1, 3, 5))
+    index = np.argwhere(volumes > 0)
+    points = cup.origin_m + cup.cell_m * (2 * index + 0.5)
+    return points, volumes[tuple(index.T)], 2 * cup.cell_m
+
+
+def _volume_under(
+    points: np.ndarray, volumes: np.ndarray, cell: float, rim: np.ndarray, up: np.ndarray
+) -> float:
+    level = (rim @ up).min()
+    return float(volumes @ _share_below(level - points @ up, cell))
+
+
+def _share_below(depth: np.ndarray, cell: float) -> np.ndarray:
+    """Return the share (0 to 1) of a cell that is under a plane `depth` above its centre."""
+    return np.clip(0.5 + depth / cell, 0.0, 1.0)
+
+
+def _room(
+    distance: np.ndarray, interior: np.ndarray, rim: np.ndarray, opening: np.ndarray, xyz: tuple, cell: float
+) -> np.ndarray:
+    """Return the share of each cell that is room; half-open cells at wall and rim make it better than the grid."""
+    x, y, z = xyz
+    radius, height = (a[..., None] for a in _rim_at(rim, opening, x[..., 0], y[..., 0]))
+    wall = np.where(interior | ((np.abs(distance) < cell) & (z < height)), _share_below(distance, cell), 0.0)
+    rim_layer = (z >= height) & (z < height + cell / 2)
+    edge = _share_below(radius - np.hypot(x - opening[0], y - opening[1]), cell)
+    return np.where(rim_layer, edge, wall) * _share_below(height - z, cell)
+
+
+def _axes(vertices: np.ndarray, cell: float) -> list[np.ndarray]:
+    low = np.floor(vertices.min(axis=0) / cell) - 4
+    high = np.ceil(vertices.max(axis=0) / cell) + 4
+    return [cell * np.arange(a, b + 1) for a, b in zip(low, high, strict=True)]
+
+
+def _pool(free: np.ndarray, cell: float, name: str) -> tuple[np.ndarray, int]:
+    """Return the largest room that the object encloses below some level, and that level's layer: the highest such."""
+    from scipy import ndimage
+
+    labels, _ = ndimage.label(free)
+    air = labels == labels[0, 0, 0]
+    largest = 0
+    for layer in range(free.shape[2] - 1, 0, -1):
+        labels, count = ndimage.label(air[:, :, : layer + 1])
+        sizes = np.bincount(labels.ravel(), minlength=count + 1)
+        sizes[[0, labels[0, 0, 0]]] = 0
+        largest = max(largest, int(sizes.max()))
+        if sizes.max() * cell**3 >= _LEAST_M3:
+            pool = np.zeros_like(free)
+            pool[:, :, : layer + 1] = labels == sizes.argmax()
+            return pool, layer
+    raise PipelineError(
+        f"{name}: expected an object that holds liquid, found room for {largest * cell**3 * 1e6:.1f} ml at any level "
+        "(a plate, a closed block, or a hole in its floor); mend the scan or put the object in objects.exclude"
+    )
+
+
+def _rim(
+    surface: Surface, axes: list[np.ndarray], pool: np.ndarray, level: int, top_m: float, cell: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the smoothed rim (M, 3) and its mean (3,)."""
+    ix, iy = np.nonzero(pool[:, :, level])
+    centre = np.array([axes[0][ix].mean(), axes[1][iy].mean()])
+    start = max(axes[2][level] - 5 * cell, axes[2][np.nonzero(pool.any(axis=(0, 1)))[0][0]])
+    for _ in range(3):
+        rim = _rim_about(surface, centre, start, top_m)
+        centre = rim[:, :2].mean(axis=0)
+    return rim, rim.mean(axis=0)
+
+
+def _rim_about(surface: Surface, centre: np.ndarray, start_m: float, top_m: float) -> np.ndarray:
+    """Follow the wall upwards in every azimuth, as seen from the axis, to its edge; (M, 3)."""
+    from scipy import ndimage
+
+    azimuth = (np.arange(AZIMUTHS) + 0.5) * 2 * np.pi / AZIMUTHS - np.pi
+    heights = np.arange(start_m, top_m + _RIM_STEP_M, _RIM_STEP_M)
+    origins = np.zeros((AZIMUTHS, len(heights), 3))
+    origins[..., :2], origins[..., 2] = centre, heights
+    out = np.stack([np.cos(azimuth), np.sin(azimuth), 0 * azimuth], axis=-1)
+    hits = surface.hit(origins, np.broadcast_to(out[:, None], origins.shape))
+    hits = ndimage.median_filter(np.pad(np.minimum(hits, 10.0), ((2, 2), (0, 0)), mode="wrap"), size=5)[2:-2]
+    radius, height = hits[:, 0], np.full(AZIMUTHS, heights[0])
+    for k in range(1, len(heights)):
+        # A step outwards is something else behind the wall: a handle that rises above the rim.
+        on = (np.abs(hits[:, k] - radius) < np.maximum(0.010, 0.35 * radius)) & (
+            heights[k] - height <= _RIM_GAP_M
+        )
+        radius, height = np.where(on, hits[:, k], radius), np.where(on, heights[k] + _RIM_STEP_M / 2, height)
+    radius, height = (
+        ndimage.gaussian_filter1d(ndimage.median_filter(a, 5, mode="wrap"), 2.0, mode="wrap")
+        for a in (radius, height)
+    )
+    return np.column_stack([centre + radius[:, None] * out[:, :2], height])
+
+
+def _rim_at(
+    rim: np.ndarray, opening: np.ndarray, x: np.ndarray, y: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    offset = rim[:, :2] - opening[:2]
+    azimuth = np.arctan2(offset[:, 1], offset[:, 0])
+    order = np.argsort(azimuth)
+    wanted = np.arctan2(y - opening[1], x - opening[0])
+    radius = np.interp(wanted, azimuth[order], np.hypot(*offset[order].T), period=2 * np.pi)
+    return radius, np.interp(wanted, azimuth[order], rim[order, 2], period=2 * np.pi)
+
+
+def _core(
+    free: np.ndarray,
+    pool: np.ndarray,
+    centres: np.ndarray,
+    rim: np.ndarray,
+    opening: np.ndarray,
+    cell: float,
+    name: str,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the cells well inside the cavity (a cell or more from its wall) and those below the rim's surface."""
+    from scipy import ndimage
+
+    x, y, z = np.moveaxis(centres, -1, 0)
+    radius, height = _rim_at(rim, opening, x[:, :, 0], y[:, :, 0])
+    below = z < height[..., None]
+    within = np.hypot(x - opening[0], y - opening[1]) < radius[..., None] - cell
+    for lowered in range(4):
+        open_below = free & (z < height[..., None] - lowered * cell)
+        labels, count = ndimage.label(open_below)
+        found = np.bincount(labels[pool & open_below], minlength=count + 1)
+        if found.any() and found.argmax() != labels[0, 0, 0]:
+            core = labels == found.argmax()
+            top = z > height[..., None] - (lowered + 1) * cell
+            return core | (free & below & within & top), below
+    raise PipelineError(
+        f"{name}: expected a wall that is closed up to its rim, found a gap just below it; "
+        "mend the scan or put the object in objects.exclude"
+    )
+
+
+def _inside(
+    surface: Surface,
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    centres: np.ndarray,
+    core: np.ndarray,
+    below: np.ndarray,
+    cell: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return which cells are inside and every cell's signed distance to the inner surface.
+
+    A point near the wall is inside when it sees the nearest point well inside.
+    """
+    from scipy import ndimage
+
+    gap, nearest = ndimage.distance_transform_edt(~core, return_indices=True)
+    band = (gap > 0) & (gap <= 3.5) & below
+    inside = core.copy()
+    inside[band] = surface.sees(centres[band], centres[tuple(n[band] for n in nearest)])
+    a, b, c = (vertices[triangles[:, i]] for i in range(3))
+    normal = np.cross(b - a, c - a)
+    normal *= 1e-4 / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+    middle = (a + b + c) / 3
+    index = tuple(np.rint((middle - centres[0, 0, 0]) / cell).astype(int).T)
+    goal = centres[tuple(n[index] for n in nearest)]
+    inner = (gap[index] <= 3.5) & (surface.sees(middle + normal, goal) | surface.sees(middle - normal, goal))
+    distance = Surface(vertices, triangles[inner]).distance_on_grid(centres, cell)
+    return inside, np.where(inside | ~below, distance, -distance)

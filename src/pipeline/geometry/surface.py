@@ -1,0 +1,65 @@
+"""Questions to a triangle mesh: how far, what is hit, what is seen. Object frame, metres."""
+
+import numpy as np
+
+
+class Surface:
+    """A triangle mesh: vertices (V, 3), triangles (F, 3). Answers are for points of any shape (..., 3)."""
+
+    def __init__(self, vertices_m: np.ndarray, triangles: np.ndarray) -> None:
+        import open3d as o3d
+
+        self._vertices = np.asarray(vertices_m, float)[np.unique(triangles)]
+        self._tensor = o3d.core.Tensor.from_numpy
+        self._scene = o3d.t.geometry.RaycastingScene(nthreads=1)
+        self._scene.add_triangles(
+            self._tensor(np.ascontiguousarray(vertices_m, np.float32)),
+            self._tensor(np.ascontiguousarray(triangles, np.uint32)),
+        )
+
+    def distance(self, points_m: np.ndarray) -> np.ndarray:
+        """Return the unsigned distance of each point to the surface."""
+        points = self._tensor(np.ascontiguousarray(points_m, np.float32))
+        return self._scene.compute_distance(points, nthreads=1).numpy().astype(float)
+
+    def distance_on_grid(self, centres_m: np.ndarray, cell_m: float) -> np.ndarray:
+        """Return the unsigned distance (nx, ny, nz) of a grid's points: exact within 3 cells, rounded to cells beyond.
+
+        No edge of the mesh may be longer than 3 cells.
+        """
+        from scipy import ndimage
+
+        marked = np.zeros(centres_m.shape[:3], dtype=bool)
+        cells = np.rint((self._vertices - centres_m[0, 0, 0]) / cell_m).astype(int)
+        marked[tuple(cells.T)] = True
+        distance = cell_m * ndimage.distance_transform_edt(~marked)
+        near = distance <= 5.5 * cell_m
+        distance[near] = self.distance(centres_m[near])
+        return distance
+
+    def hit(self, origins_m: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """Return how far each ray (unit direction) goes before it hits; inf if it never does."""
+        return (
+            self._scene.cast_rays(self._rays(origins_m, directions), nthreads=1)["t_hit"]
+            .numpy()
+            .astype(float)
+        )
+
+    def sees(self, points_m: np.ndarray, goals_m: np.ndarray) -> np.ndarray:
+        """Return whether the straight line from each point to its goal is free of surface."""
+        rays = self._rays(points_m, goals_m - points_m)
+        return ~self._scene.test_occlusions(rays, tnear=0.0, tfar=1.0, nthreads=1).numpy()
+
+    def _rays(self, origins: np.ndarray, directions: np.ndarray):
+        return self._tensor(np.concatenate([origins, directions], axis=-1).astype(np.float32))
+
+
+def subdivided(vertices_m: np.ndarray, triangles: np.ndarray, edge_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the same surface with no edge longer than `edge_m`; unchanged when there is none."""
+    corners = vertices_m[triangles]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1).max()
+    if longest <= edge_m:
+        return vertices_m, triangles
+    from trimesh.remesh import subdivide_to_size
+
+    return subdivide_to_size(vertices_m, triangles, edge_m, max_iter=20)

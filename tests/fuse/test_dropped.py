@@ -1,0 +1,75 @@
+"""Meshes that a user drops: oriented, repaired, upright, in metres."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from pipeline import artefacts
+from pipeline.fuse.fusion import fused
+from pipeline.geometry import frames
+from pipeline.scan.shapes import shape
+
+OPTIONS = {"voxel_m": 0.001, "truncation_m": 0.002, "n_points": 5000, "seed": 2}
+
+
+def drop(folder, vertices: np.ndarray, triangles: np.ndarray, file: str = "cup.ply"):
+    folder.mkdir(exist_ok=True)
+    trimesh.Trimesh(vertices, triangles, process=False).export(folder / file)
+    return fused(folder, **OPTIONS)
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".obj", ".stl", ".glb", ".off"])
+def test_every_format(tmp_path, suffix):
+    cup = shape("small_cup")
+    result = drop(tmp_path / "cup", cup.vertices_m + [1, 2, 3], cup.triangles, f"cup{suffix}")
+    vertices, triangles = result.mesh
+    mesh = trimesh.Trimesh(vertices, triangles, process=False)
+    assert result.report["layout"] == "mesh"
+    assert mesh.is_watertight
+    np.testing.assert_allclose(mesh.bounds, [[-0.0275, -0.0275, 0], [0.0275, 0.0275, 0.06]], atol=2e-6)
+    assert mesh.volume == pytest.approx(trimesh.Trimesh(cup.vertices_m, cup.triangles).volume, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("up", "T_file_object"),
+    [
+        ("y", [[1, 0, 0], [0, 0, 1], [0, -1, 0]]),
+        ("x", [[0, 0, 1], [1, 0, 0], [0, 1, 0]]),
+        ("-z", np.diag([1, -1, -1])),
+    ],
+)
+def test_the_named_axis_points_up(tmp_path, up, T_file_object):
+    mug = shape("mug")
+    (tmp_path / "mug").mkdir()
+    (tmp_path / "mug" / "scan.yaml").write_text(f"up: {up}\n")
+    T_file_object = frames.transform(np.array(T_file_object, float), np.array([0.3, 0.2, 0.1]))
+    result = drop(tmp_path / "mug", frames.apply(T_file_object, mug.vertices_m), mug.triangles)
+    T = np.array(result.report["T_object_world"]) @ T_file_object
+    np.testing.assert_allclose(T[:3, 2], [0, 0, 1], atol=1e-12)
+    assert np.linalg.det(T[:3, :3]) == pytest.approx(1)
+    np.testing.assert_allclose(np.sort(result.mesh[0][:, 2]), np.sort(mug.vertices_m[:, 2]), atol=1e-6)
+
+
+def test_flipped_and_doubled_faces_are_mended(tmp_path):
+    cup = shape("small_cup")
+    rng = np.random.default_rng(1)
+    triangles = np.where(rng.random((len(cup.triangles), 1)) < 0.3, cup.triangles[:, ::-1], cup.triangles)
+    empty = np.repeat(triangles[:5, :1], 3, axis=1)
+    result = drop(tmp_path / "cup", cup.vertices_m, np.concatenate([triangles, triangles[:100], empty]))
+    mesh = trimesh.Trimesh(*result.mesh, process=False)
+    assert len(mesh.faces) == len(cup.triangles)
+    assert mesh.is_watertight
+    assert mesh.is_winding_consistent
+    assert mesh.volume > 0
+    cloud = result.cloud
+    inside = np.hypot(cloud.x_m, cloud.y_m) < 0.02
+    floor = cloud[inside & (cloud.z_m < 0.02)]
+    upper = floor.z_m > 0.001
+    assert (floor.nz[upper] > 0).all()
+    assert (floor.nz[~upper] < 0).all()
+
+
+def test_same_mesh_same_cloud(tmp_path):
+    cup = shape("small_cup")
+    first, second = (drop(tmp_path / name, cup.vertices_m, cup.triangles).cloud for name in ("a", "b"))
+    np.testing.assert_array_equal(artefacts.points(first), artefacts.points(second))
