@@ -1,0 +1,111 @@
+"""Simulate an object's trials: `pouring` from it, or `filling` it from the held cups (paper, Section IV-A)."""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from pipeline import artefacts, command
+from pipeline.errors import PipelineError
+
+
+def main() -> None:
+    """Read the options and run all trials of one object and experiment, in one process."""
+    options = _options()
+    rows = _pouring(options) if options.experiment == "pouring" else _filling(options)
+    import pandas as pd
+
+    artefacts.write_table(options.trials_table, pd.DataFrame(rows), "trials")
+
+
+def _options() -> argparse.Namespace:
+    parser = command.parser(__doc__)
+    experiments = parser.add_subparsers(dest="experiment", required=True)
+    pouring, filling = (
+        experiments.add_parser(
+            name, help=text, allow_abbrev=False, formatter_class=argparse.ArgumentDefaultsHelpFormatter
+        )
+        for name, text in (
+            ("pouring", "tilt the object, filled at random"),
+            ("filling", "pour into the object"),
+        )
+    )
+    for experiment in (pouring, filling):
+        experiment.add_argument("--object", required=True, help="name of the object")
+        experiment.add_argument(
+            "--mesh", type=Path, required=True, help="its fused mesh (PLY, metres, upright)"
+        )
+        experiment.add_argument(
+            "--trials-table", type=Path, required=True, help="where the trials are written"
+        )
+        experiment.add_argument("--spacing-m", type=float, default=0.010, help="particle spacing")
+        experiment.add_argument("--seed", type=int, default=4, help="of the whole experiment")
+        experiment.add_argument("--trials", type=int, default=1000, help="number of trials")
+    pouring.add_argument("--fill-min", type=float, default=0.05, help="least fill, share of the capacity")
+    pouring.add_argument("--fill-max", type=float, default=1.0, help="largest fill, share of the capacity")
+    pouring.add_argument("--tilt-max-deg", type=float, default=120.0, help="largest tilt")
+    pouring.add_argument("--threshold", type=int, default=1, help="particles that make a pour")
+    filling.add_argument("--held", nargs="+", required=True, metavar="NAME=MESH", help="held cups, in order")
+    filling.add_argument("--held-particles", type=int, default=10, help="particles in the held cup")
+    filling.add_argument("--tilt-deg", type=float, default=120.0, help="tilt of the held cup")
+    filling.add_argument(
+        "--offset-max-radii", type=float, default=1.5, help="largest |dx|, |dy|, radii of the object"
+    )
+    filling.add_argument(
+        "--height-min", type=float, default=0.1, help="least height, heights of the held cup"
+    )
+    filling.add_argument(
+        "--height-max", type=float, default=1.0, help="largest height, heights of the held cup"
+    )
+    filling.add_argument(
+        "--free-room-max-particles",
+        type=int,
+        default=20,
+        help="most free room in the nearly full half, particles",
+    )
+    return parser.parse_args()
+
+
+def _pouring(options: argparse.Namespace) -> list[dict]:
+    from pipeline.simulate import draws, trials
+
+    protocol = draws.Pouring(
+        options.fill_min, options.fill_max, float(np.radians(options.tilt_max_deg)), options.threshold
+    )
+    cup = trials.container(options.object, *artefacts.read_mesh(options.mesh), options.spacing_m)
+    numbers = command.progress(range(options.trials), options.trials, f"pouring {options.object}")
+    return [trials.pouring_trial(cup, protocol, number, options.seed) for number in numbers]
+
+
+def _filling(options: argparse.Namespace) -> list[dict]:
+    from pipeline.simulate import draws, trials
+
+    protocol = draws.Filling(
+        held_particles=options.held_particles,
+        tilt_rad=float(np.radians(options.tilt_deg)),
+        offset_max_radii=options.offset_max_radii,
+        height_min=options.height_min,
+        height_max=options.height_max,
+        free_room_max_particles=options.free_room_max_particles,
+    )
+    second = trials.container(options.object, *artefacts.read_mesh(options.mesh), options.spacing_m)
+    held = [
+        trials.container(name, *artefacts.read_mesh(path), options.spacing_m)
+        for name, path in map(_name_and_path, options.held)
+    ]
+    numbers = command.progress(range(options.trials), options.trials, f"filling {options.object}")
+    with trials.FillingExperiment(second, held, protocol) as experiment:
+        return [experiment.trial(number, options.seed) for number in numbers]
+
+
+def _name_and_path(text: str) -> tuple[str, Path]:
+    name, equals, path = text.partition("=")
+    if not (name and equals and path):
+        raise PipelineError(
+            f"--held {text}: expected NAME=MESH, such as mug=data/processed/fuse/mug/mesh.ply"
+        )
+    return name, Path(path)
+
+
+if __name__ == "__main__":
+    command.run(main)
