@@ -10,6 +10,8 @@ from pipeline.artefacts import read_json, read_table, write_json
 if TYPE_CHECKING:
     import pandas as pd
 
+    from pipeline.report.accuracy import Truth
+
 EXPERIMENTS = {"pouring": "poured", "filling": "filled"}
 MAPPINGS = ("label_mapping", "point_mapping")
 
@@ -64,7 +66,7 @@ def accuracy_metrics(processed: Path, source: str, known: list[str]) -> Metrics:
     return metrics | _headlines(found) if known else metrics
 
 
-def _labels(processed: Path, source: str, name: str, truth: "object") -> Metrics:
+def _labels(processed: Path, source: str, name: str, truth: "Truth") -> Metrics:
     """Return the scores of initial labels (`label.`) and of mapped labels (`warp.label_mapping.`)."""
     from pipeline.report import accuracy
 

@@ -1,7 +1,7 @@
 """What all figures share: fonts that print, one colour and one word for each feature set."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pipeline.artefacts import replacing
 
@@ -21,7 +21,7 @@ WORDS = {
     "standard": "standard features",
     "hydrostatic": "hydrostatic ceiling",
 }
-RC = {
+RC: dict[str, Any] = {
     "font.size": 8,
     "axes.labelsize": 8,
     "axes.titlesize": 9,
