@@ -14,7 +14,9 @@ def trials(n: int = 200, objects: tuple[str, ...] = ("cup", "bowl"), seed: int =
     rng, tables = np.random.default_rng(seed), []
     for size, name in enumerate(objects, start=1):
         tilt, fill = rng.uniform(0, 2.0, n), rng.uniform(0.05, 1.0, n)
-        table = pd.DataFrame({"trial": np.arange(n), "experiment": "pouring", "object": name, "held_object": name})
+        table = pd.DataFrame(
+            {"trial": np.arange(n), "experiment": "pouring", "object": name, "held_object": name}
+        )
         table["tilt_rad"], table["fill_m3"] = tilt, fill * size * 1e-4
         table[["lip_x_m", "lip_y_m", "lip_z_m"]] = [0.04 * size, 0.0, 0.1 * size]
         table["hydrostatic_margin"] = tilt / 1.2 + fill - 1.2
@@ -83,7 +85,9 @@ def test_rescaled_features_give_the_same_scores_on_the_training_object():
     sets["label_mapping"] = features(table, parameters(), standard=False)
     results = evaluate(table, "poured", sets, samples=50, draws=3, ridge=1.0, seed=1)
     scores = pd.DataFrame(results.scores)
-    same = scores[scores["split"] == "same"].pivot(index=["training_object", "draw"], columns="features", values="auc")
+    same = scores[scores["split"] == "same"].pivot(
+        index=["training_object", "draw"], columns="features", values="auc"
+    )
     np.testing.assert_allclose(same["standard"], same["label_mapping"], atol=1e-9)
     novel = scores[scores["split"] == "novel"].groupby("features")["auc"].mean()
     assert novel["label_mapping"] > novel["standard"] + 0.01
@@ -91,7 +95,15 @@ def test_rescaled_features_give_the_same_scores_on_the_training_object():
 
 def test_splits_leave_out_the_training_samples_and_hold_all_others():
     table = trials()
-    results = evaluate(table, "poured", {"standard": features(table, parameters(), standard=True)}, samples=50, draws=1, ridge=1.0, seed=1)
+    results = evaluate(
+        table,
+        "poured",
+        {"standard": features(table, parameters(), standard=True)},
+        samples=50,
+        draws=1,
+        ridge=1.0,
+        seed=1,
+    )
     for tested in results.predictions:
         split, training = tested["split"].iloc[0], tested["training_object"].iloc[0]
         own = tested["test_object"] == training
@@ -103,7 +115,15 @@ def test_draws_of_an_object_do_not_depend_on_the_others():
     table = trials()
     alone = table[table["object"] == "cup"].reset_index(drop=True)
     both, one = (
-        evaluate(t, "poured", {"standard": features(t, parameters(), standard=True)}, samples=50, draws=2, ridge=1.0, seed=1)
+        evaluate(
+            t,
+            "poured",
+            {"standard": features(t, parameters(), standard=True)},
+            samples=50,
+            draws=2,
+            ridge=1.0,
+            seed=1,
+        )
         for t in (table, alone)
     )
     same = [score for score in both.scores if score["training_object"] == "cup" and score["split"] == "same"]
@@ -140,7 +160,9 @@ def test_separation_is_told():
 
 def test_roc_is_read_at_fixed_rates_without_interpolating():
     # Scores .9 + .8 - .7 + .1 -: at no false positive half of the true ones are found.
-    outcome = score(np.array([True, True, False, True, True, False]), np.array([0.9, 0.8, 0.7, 0.6, 0.5, 0.1]))
+    outcome = score(
+        np.array([True, True, False, True, True, False]), np.array([0.9, 0.8, 0.7, 0.6, 0.5, 0.1])
+    )
     assert outcome.tpr_at(0.0) == 0.5
     assert outcome.tpr_at(0.49) == 0.5
     assert outcome.tpr_at(0.5) == 1.0

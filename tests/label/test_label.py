@@ -17,7 +17,11 @@ def features(name: str) -> np.ndarray:
 
 def test_features_do_not_depend_on_scale_or_pose():
     cloud = points(sampled("mug"))
-    turned = 1.7 * cloud @ np.array([[0.0, -1.0, 0.0], [0.6, 0.0, -0.8], [0.8, 0.0, 0.6]]).T + [0.3, 0.1, -0.2]
+    turned = 1.7 * cloud @ np.array([[0.0, -1.0, 0.0], [0.6, 0.0, -0.8], [0.8, 0.0, 0.6]]).T + [
+        0.3,
+        0.1,
+        -0.2,
+    ]
     np.testing.assert_allclose(neighbourhood_features(turned, NEIGHBOURS), features("mug"), atol=1e-9)
 
 
@@ -58,7 +62,9 @@ def test_annotation_is_carried_to_the_nearest_points():
 def test_annotation_of_another_scan_is_refused():
     cloud = sampled("mug")
     with pytest.raises(PipelineError, match=r"annotation\.parquet.*0\.[0-9]+ m away"):
-        transfer_annotation(points(cloud) + 0.2, cloud[PARTS].to_numpy(), points(cloud), name="annotation.parquet")
+        transfer_annotation(
+            points(cloud) + 0.2, cloud[PARTS].to_numpy(), points(cloud), name="annotation.parquet"
+        )
 
 
 def test_the_last_box_that_holds_a_point_gives_its_parts(tmp_path):

@@ -46,7 +46,9 @@ def test_tilt_reference_of_a_cup_is_that_of_its_cylinder():
 @pytest.mark.parametrize(("scale", "yaw_rad"), [(0.5, 1.0), (2.0, -2.0)])
 def test_parameters_scale_with_the_object(scale, yaw_rad):
     table = sampled("mug")
-    here, there = (evaluate([*SCALARS, "tilt_references_rad"], p) for p in (pieces(table), pieces(table, scale, yaw_rad)))
+    here, there = (
+        evaluate([*SCALARS, "tilt_references_rad"], p) for p in (pieces(table), pieces(table, scale, yaw_rad))
+    )
     for name, power in {"radius_m": 1, "height_m": 1, "volume_m3": 3, "capacity_m3": 3}.items():
         assert there[name] == pytest.approx(scale**power * here[name], rel=0.005), name
     np.testing.assert_allclose(there["tilt_references_rad"], here["tilt_references_rad"], atol=0.03)
@@ -79,7 +81,9 @@ def test_a_table_with_a_missing_column_is_refused_and_nothing_is_written(tmp_pat
         write_table(path, sampled("mug").drop(columns="p_rim"), "labels")
     assert list(tmp_path.iterdir()) == []
     write_table(path, sampled("mug"), "labels")
-    pd.testing.assert_frame_equal(read_table(path, "labels")[list(sampled("mug"))], sampled("mug"), check_dtype=False)
+    pd.testing.assert_frame_equal(
+        read_table(path, "labels")[list(sampled("mug"))], sampled("mug"), check_dtype=False
+    )
 
 
 def test_a_truncated_table_is_refused_by_file(tmp_path):

@@ -7,13 +7,20 @@ from pipeline.report.style import save
 
 
 def curve(training_object: str, draw_number: int, tpr: list[float]) -> pd.DataFrame:
-    head = {"experiment": "pouring", "features": "standard", "split": "novel", "training_object": training_object}
+    head = {
+        "experiment": "pouring",
+        "features": "standard",
+        "split": "novel",
+        "training_object": training_object,
+    }
     return pd.DataFrame({**head, "draw": draw_number, "fpr": [0.0, 0.5, 1.0], "tpr": tpr})
 
 
 def test_draws_are_averaged_within_an_object_before_objects_are():
     # The cup has three draws and the bowl one; each object counts once.
-    curves = pd.concat([*(curve("cup", i, [0.0, 0.2, 1.0]) for i in range(3)), curve("bowl", 0, [0.4, 0.8, 1.0])])
+    curves = pd.concat(
+        [*(curve("cup", i, [0.0, 0.2, 1.0]) for i in range(3)), curve("bowl", 0, [0.4, 0.8, 1.0])]
+    )
     np.testing.assert_allclose(mean_curves(curves)["mean"], [0.2, 0.5, 1.0])
 
 
@@ -27,7 +34,10 @@ def test_the_figure_is_the_same_bytes_for_the_same_curves(tmp_path):
 
 
 def metrics(**auc: float) -> dict[str, float]:
-    values = {"classify.pouring.same_auc_difference_max": 0.0, "classify.pouring.label_mapping.novel.tpr_at_fpr_01": 0.4}
+    values = {
+        "classify.pouring.same_auc_difference_max": 0.0,
+        "classify.pouring.label_mapping.novel.tpr_at_fpr_01": 0.4,
+    }
     for experiment in ("pouring", "filling"):
         for features in ("label_mapping", "point_mapping", "standard"):
             for split in ("same", "novel"):

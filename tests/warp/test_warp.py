@@ -59,7 +59,9 @@ def test_a_base_edge_taken_for_rim_does_not_flip_the_frame():
 
 def test_an_upside_down_cup_is_named():
     cup = cloud("short_cup")
-    with pytest.raises(PipelineError, match=r"short_cup: expected an upright container.*1[78][0-9]° from the top"):
+    with pytest.raises(
+        PipelineError, match=r"short_cup: expected an upright container.*1[78][0-9]° from the top"
+    ):
         part_frame(cup.points_m * [1, -1, -1], cup.parts, name=cup.name)
 
 
@@ -116,21 +118,29 @@ def test_neighbours_across_the_wall_are_passed_over():
     outer = inner + [0.003, 0.0, 0.0]
     facing = np.array([[-1.0, 0.0, 0.0]] * 200 + [[1.0, 0.0, 0.0]] * 200)
     query = np.array([[0.0021, 0.05, 0.0]])
-    index, distance = agreeing_neighbours(query, np.array([[-1.0, 0.0, 0.0]]), np.vstack([inner, outer]), facing, 3)
+    index, distance = agreeing_neighbours(
+        query, np.array([[-1.0, 0.0, 0.0]]), np.vstack([inner, outer]), facing, 3
+    )
     assert (index < 200).all()
     assert distance[0, 0] == pytest.approx(0.0021, abs=1e-4)
 
 
 def test_points_without_any_agreeing_normal_are_marked():
-    index, distance = agreeing_neighbours(np.zeros((1, 3)), np.eye(3)[:1], np.ones((5, 3)), -np.ones((5, 3)), 2)
+    index, distance = agreeing_neighbours(
+        np.zeros((1, 3)), np.eye(3)[:1], np.ones((5, 3)), -np.ones((5, 3)), 2
+    )
     assert (index == -1).all()
     assert np.isinf(distance).all()
 
 
 def test_label_mapping_of_several_neighbours_takes_the_majority():
     labels = np.array([[True], [True], [False]])
-    np.testing.assert_array_equal(majority_of_neighbours(labels, np.array([[0, 1, 2], [2, 2, 0]]))[:, 0], [True, False])
+    np.testing.assert_array_equal(
+        majority_of_neighbours(labels, np.array([[0, 1, 2], [2, 2, 0]]))[:, 0], [True, False]
+    )
 
 
 def test_linear_stretch_scales_about_the_origin():
-    np.testing.assert_allclose(linear(np.array([2.0, 3.0, 4.0])).map(np.array([[1.0, 1, 1], [-2.0, 0, 1]])), [[2, 3, 4], [-4, 0, 4]])
+    np.testing.assert_allclose(
+        linear(np.array([2.0, 3.0, 4.0])).map(np.array([[1.0, 1, 1], [-2.0, 0, 1]])), [[2, 3, 4], [-4, 0, 4]]
+    )

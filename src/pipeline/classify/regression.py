@@ -31,7 +31,9 @@ def classifier(ridge: float) -> Pipeline:
     The loss is the sum of the negative log likelihoods plus ridge/2 × the squared standardised weights; the intercept is
     free. Without the ridge most sets of 50 samples have no estimate, because a plane separates them.
     """
-    return make_pipeline(StandardScaler(), LogisticRegression(C=1.0 / ridge, solver="newton-cholesky", tol=1e-8))
+    return make_pipeline(
+        StandardScaler(), LogisticRegression(C=1.0 / ridge, solver="newton-cholesky", tol=1e-8)
+    )
 
 
 def iterations(fitted: Pipeline) -> tuple[int, bool]:

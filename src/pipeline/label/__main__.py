@@ -11,8 +11,12 @@ def main() -> None:
     parser = command.parser(__doc__)
     for option in ("--source-cloud", "--source-fusion", "--annotation", "--cloud", "--labels"):
         parser.add_argument(option, type=Path, required=True)
-    parser.add_argument("--neighbours", type=int, nargs="+", default=[60, 120, 300], help="points a neighbourhood")
-    parser.add_argument("--ridge", type=float, default=300.0, help="weight of the squared standardised weights")
+    parser.add_argument(
+        "--neighbours", type=int, nargs="+", default=[60, 120, 300], help="points a neighbourhood"
+    )
+    parser.add_argument(
+        "--ridge", type=float, default=300.0, help="weight of the squared standardised weights"
+    )
     options = parser.parse_args()
 
     import numpy as np

@@ -71,7 +71,10 @@ def _alignment(warp: "Warp", mapped: "dict[str, Mapped]") -> dict:
         "T_source_part": warp.source_frame.T_object_part.tolist(),
         "T_target_part": warp.target_frame.T_object_part.tolist(),
         "first_axis_knots_m": warp.stretch.knots_m.tolist(),
-        "scale": [float(np.ptp(warp.stretch.knots_m[1]) / np.ptp(warp.stretch.knots_m[0])), *warp.stretch.scale.tolist()],
+        "scale": [
+            float(np.ptp(warp.stretch.knots_m[1]) / np.ptp(warp.stretch.knots_m[0])),
+            *warp.stretch.scale.tolist(),
+        ],
         "offset_m": warp.stretch.offset_m.tolist(),
         "roll_observable": warp.target_frame.roll_observable,
         **{

@@ -11,7 +11,9 @@ from pipeline.warp.nearest import agreeing_neighbours, majority_of_neighbours, m
 from pipeline.warp.stretch import Stretch, between_extents, linear
 
 REFINEMENT_POINTS = 4000
-WALL_COSINE = 0.8  # a point is on a wall, not on a lip or floor, where its normal is this near to the horizontal
+WALL_COSINE = (
+    0.8  # a point is on a wall, not on a lip or floor, where its normal is this near to the horizontal
+)
 
 
 @dataclass(frozen=True)
