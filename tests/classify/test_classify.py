@@ -135,7 +135,7 @@ def test_one_class_draws_are_redrawn_and_one_class_objects_refused():
     labels[:2] = True
     redrawn = [draw_training_set(labels, 50, (seed,), name="cup")[1] for seed in range(20)]
     assert max(redrawn) > 0
-    with pytest.raises(PipelineError, match="pouring/cup.*both outcomes.*200 trials, 0"):
+    with pytest.raises(PipelineError, match=r"pouring/cup.*both outcomes.*200 trials, 0"):
         draw_training_set(np.zeros(200, dtype=bool), 50, (0,), name="pouring/cup")
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-
 from conftest import PARTS, sampled
+
 from pipeline.artefacts import points
 from pipeline.errors import PipelineError
 from pipeline.label.classifier import train, transfer_annotation

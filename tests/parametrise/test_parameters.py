@@ -1,8 +1,8 @@
 import numpy as np
 import pandas as pd
 import pytest
-
 from conftest import sampled
+
 from pipeline.artefacts import normals, points, read_table, write_table
 from pipeline.errors import PipelineError
 from pipeline.geometry.frames import rotation_about

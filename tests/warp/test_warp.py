@@ -2,8 +2,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from conftest import PARTS, sampled
+
 from pipeline.artefacts import normals, points
 from pipeline.errors import PipelineError
 from pipeline.geometry.frames import rotation_about

@@ -21,7 +21,7 @@ WORDS = {
     "standard": "standard features",
     "hydrostatic": "hydrostatic ceiling",
 }
-RC: dict[str, Any] = {
+RC: Any = {
     "font.size": 8,
     "axes.labelsize": 8,
     "axes.titlesize": 9,

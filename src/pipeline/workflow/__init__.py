@@ -1,0 +1,1 @@
+"""What the Snakefile asks first: is the configuration sound, which objects are there, which code makes what?"""

@@ -1,0 +1,102 @@
+"""A copy of the project in which the workflow really runs: once for all tests, then a copy of the finished state for each."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).parents[2]
+PARTS = ["Snakefile", "config", "workflow", "profiles", "src"]
+JOB = re.compile(r"^(?:local)?rule (\w+):\n((?:    .*\n)*)", re.MULTILINE)
+WILDCARD = re.compile(r"(?:object|experiment)=(\w+)")
+
+
+@dataclass(frozen=True)
+class Project:
+    """A folder with the workflow in it."""
+
+    folder: Path
+
+    def __truediv__(self, path: str) -> Path:
+        """Return the path of a file of the project."""
+        return self.folder / path
+
+    def call(self, *arguments: str, cores: int = 2) -> subprocess.CompletedProcess:
+        """Run Snakemake on the small overlay; stdout and stderr come together."""
+        environment = {
+            key: value
+            for key, value in os.environ.items()
+            if key not in ("MLFLOW_TRACKING_URI", "PYTHONPATH")
+        }
+        # The targets come first, as --configfile takes all words that follow it.
+        snakemake = [sys.executable, "-m", "snakemake", f"-c{cores}"]
+        command = [*snakemake, *arguments, "--configfile", "config/test.yaml"]
+        return subprocess.run(
+            command,
+            **{"cwd": self.folder, "env": environment, "text": True},
+            **{"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT},
+        )
+
+    def planned(self, *arguments: str) -> set[str]:
+        """Return what the next call would run: rule and object or experiment."""
+        told = self.call("--dry-run", *arguments)
+        assert told.returncode == 0, told.stdout
+        jobs = {" ".join([rule, *WILDCARD.findall(body)]) for rule, body in JOB.findall(told.stdout)}
+        assert jobs or "Nothing to be done" in told.stdout, told.stdout
+        return jobs - {"all"}
+
+    def configure(self, key: str, value: object) -> None:
+        """Set one dotted key of the overlay."""
+        path = self / "config/test.yaml"
+        config = yaml.safe_load(path.read_text())
+        *sections, name = key.split(".")
+        inner = config
+        for section in sections:
+            inner = inner.setdefault(section, {})
+        inner[name] = value
+        path.write_text(yaml.safe_dump(config))
+
+    def contents(self) -> dict[str, bytes]:
+        """Return path → bytes of every scan and result; figures are compared as numbers, in metrics.json."""
+        folders = [self / "data", self / "reports"]
+        paths = [path for folder in folders for path in sorted(folder.rglob("*")) if path.is_file()]
+        return {
+            str(path.relative_to(self.folder)): path.read_bytes() for path in paths if path.suffix != ".pdf"
+        }
+
+
+def new_project(folder: Path) -> Project:
+    """Return a copy of the project without any data or result."""
+    for part in PARTS:
+        copy = shutil.copytree if (ROOT / part).is_dir() else shutil.copy2
+        copy(ROOT / part, folder / part)
+    (folder / "data/raw").mkdir(parents=True)
+    return Project(folder)
+
+
+@pytest.fixture
+def fresh(tmp_path) -> Project:
+    """Return the project as it is after cloning."""
+    (tmp_path / "project").mkdir()
+    return new_project(tmp_path / "project")
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory) -> Project:
+    """Return the project after one call; shared, so only to be read."""
+    project = new_project(tmp_path_factory.mktemp("finished"))
+    told = project.call("reports/roc.pdf")
+    assert told.returncode == 0, told.stdout
+    return project
+
+
+@pytest.fixture
+def project(finished, tmp_path) -> Project:
+    """Return a copy of the finished project, with its time stamps."""
+    return Project(shutil.copytree(finished.folder, tmp_path / "project", symlinks=True))

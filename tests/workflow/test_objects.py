@@ -1,0 +1,60 @@
+"""Which objects take part."""
+
+import pytest
+
+from pipeline.errors import PipelineError
+from pipeline.workflow.objects import files, find
+
+
+def _config(scanned=("mug", "jug"), exclude=(), held=("mug",), source="mug") -> dict:
+    return {
+        "objects": {"source": source, "exclude": list(exclude)},
+        "scan": {"objects": list(scanned)},
+        "simulate": {"filling": {"held_objects": list(held)}},
+    }
+
+
+def test_demonstration_and_dropped_objects_in_alphabetical_order(tmp_path):
+    for name in ("zulu", "alpha", ".hidden", "mug"):
+        (tmp_path / name).mkdir()
+    found = find(tmp_path, _config())
+    assert found.demonstration == ("jug", "mug")
+    assert found.dropped == ("alpha", "zulu")
+    assert found.names == ("alpha", "jug", "mug", "zulu")
+
+
+def test_excluded_objects_of_both_kinds_take_no_part(tmp_path):
+    (tmp_path / "alpha").mkdir()
+    (tmp_path / "zulu").mkdir()
+    assert find(tmp_path, _config(exclude=["alpha", "jug"])).names == ("mug", "zulu")
+
+
+def test_a_dropped_object_can_be_source_and_held(tmp_path):
+    (tmp_path / "alpha").mkdir()
+    assert find(tmp_path, _config(source="alpha", held=["alpha"])).dropped == ("alpha",)
+
+
+def test_frames_of_a_demonstration_scan_are_no_foreign_files(tmp_path):
+    (tmp_path / "mug").mkdir()
+    for name in ("frame-000000.depth.png", "frame-000000.pose.txt", "camera-intrinsics.txt", ".directory"):
+        (tmp_path / "mug" / name).touch()
+    assert find(tmp_path, _config()).demonstration == ("jug", "mug")
+
+
+def test_one_object_alone_is_refused(tmp_path):
+    with pytest.raises(PipelineError, match="expected at least two"):
+        find(tmp_path, _config(scanned=["mug"]))
+
+
+def test_without_a_raw_folder_the_demonstration_objects_are_there(tmp_path):
+    assert find(tmp_path / "nothing", _config()).names == ("jug", "mug")
+
+
+def test_files_follow_links_and_skip_hidden_ones(tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere/b.png").touch()
+    (tmp_path / "cup/.git").mkdir(parents=True)
+    for name in (".git/x", "a.txt", ".DS_Store"):
+        (tmp_path / "cup" / name).touch()
+    (tmp_path / "cup/depth").symlink_to(tmp_path / "elsewhere")
+    assert files(tmp_path / "cup") == [f"{tmp_path}/cup/a.txt", f"{tmp_path}/cup/depth/b.png"]
