@@ -71,11 +71,11 @@ class Project:
         }
 
 
-def new_project(folder: Path) -> Project:
-    """Return a copy of the project without any data or result."""
+def new_project(folder: Path, source: Path = ROOT) -> Project:
+    """Return a copy of the project at `source` without any data or result."""
     for part in PARTS:
-        copy = shutil.copytree if (ROOT / part).is_dir() else shutil.copy2
-        copy(ROOT / part, folder / part)
+        copy = shutil.copytree if (source / part).is_dir() else shutil.copy2
+        copy(source / part, folder / part)
     (folder / "data/raw").mkdir(parents=True)
     return Project(folder)
 
@@ -94,6 +94,13 @@ def finished(tmp_path_factory) -> Project:
     told = project.call("reports/roc.pdf")
     assert told.returncode == 0, told.stdout
     return project
+
+
+@pytest.fixture
+def unfinished(finished, tmp_path) -> Project:
+    """Return the finished project's code without its data and results."""
+    (tmp_path / "unfinished").mkdir()
+    return new_project(tmp_path / "unfinished", finished.folder)
 
 
 @pytest.fixture

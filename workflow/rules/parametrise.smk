@@ -1,0 +1,52 @@
+# Needs both mappings of an object.
+# Makes parametrise/<source>/<object>.parquet and tilt_references/<object>.parquet, then the tables of all objects,
+#       parameters.parquet and tilt_references.parquet.
+# How: one function a parameter, evaluated on the warped points.
+
+
+rule parametrise:
+    input:
+        point=rules.warp.output.point,
+        label=rules.warp.output.label,
+    output:
+        parameters=f"{PROCESSED}/parametrise/{{source}}/{{object}}.parquet",
+        tilt_references=f"{PROCESSED}/parametrise/{{source}}/tilt_references/{{object}}.parquet",
+    log:
+        "logs/parametrise/{source}/{object}.log",
+    benchmark:
+        "benchmarks/parametrise/{source}/{object}.tsv"
+    threads: 1
+    params:
+        options=options("parametrise", "hull_points"),
+        code=code("pipeline.parametrise"),
+    shell:
+        "python -m pipeline.parametrise --object {wildcards.object} --point-mapping {input.point:q} --label-mapping {input.label:q}"
+        " --parameters {output.parameters:q} --tilt-references {output.tilt_references:q} {params.options} > {log:q} 2>&1"
+
+
+rule assemble_parameters:
+    input:
+        each(rules.parametrise.output.parameters),
+    output:
+        f"{PROCESSED}/parametrise/{SOURCE}/parameters.parquet",
+    log:
+        "logs/parametrise/parameters.log",
+    threads: 1
+    params:
+        code=code("pipeline.parametrise.assemble"),
+    shell:
+        "python -m pipeline.parametrise.assemble --tables {input:q} --table parameters --output {output:q} > {log:q} 2>&1"
+
+
+rule assemble_tilt_references:
+    input:
+        each(rules.parametrise.output.tilt_references),
+    output:
+        f"{PROCESSED}/parametrise/{SOURCE}/tilt_references.parquet",
+    log:
+        "logs/parametrise/tilt_references.log",
+    threads: 1
+    params:
+        code=code("pipeline.parametrise.assemble"),
+    shell:
+        "python -m pipeline.parametrise.assemble --tables {input:q} --table tilt_references --output {output:q} > {log:q} 2>&1"

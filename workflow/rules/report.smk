@@ -1,0 +1,34 @@
+# Needs the curves and scores of both experiments; for the numbers also what every stage made, and the demonstration objects' truth.
+# Makes reports/roc.pdf (the paper's Fig. 3) and reports/metrics.json (every headline number).
+# How: one module a figure; truth is compared here and nowhere else.
+
+
+rule report:
+    input:
+        curves=expand(rules.classify.output.curves, experiment=EXPERIMENTS),
+        scores=expand(rules.classify.output.scores, experiment=EXPERIMENTS),
+        predictions=expand(rules.classify.output.predictions, experiment=EXPERIMENTS),
+        truth=each(rules.scan.output.truth, FOUND.demonstration),
+        fuse=each(list(rules.fuse.output)),
+        label=each(rules.label.output.labels),
+        warp=each(list(rules.warp.output)),
+        parametrise=[rules.assemble_parameters.output[0], rules.assemble_tilt_references.output[0]],
+        pouring=each(rules.simulate_pouring.output.trials),
+        filling=each(rules.simulate_filling.output.trials),
+    output:
+        roc=f"{REPORTS}/roc.pdf",
+        metrics=f"{REPORTS}/metrics.json",
+    log:
+        "logs/report/report.log",
+    benchmark:
+        "benchmarks/report/report.tsv"
+    threads: 1
+    params:
+        processed=PROCESSED,
+        source=SOURCE,
+        objects=" ".join(OBJECTS),
+        code=code("pipeline.report.roc", "pipeline.report.metrics"),
+    shell:
+        "python -m pipeline.report.roc --curves {input.curves:q} --scores {input.scores:q} --output {output.roc:q} > {log:q} 2>&1\n"
+        "python -m pipeline.report.metrics --processed {params.processed:q} --source {params.source} --objects {params.objects}"
+        " --output {output.metrics:q} >> {log:q} 2>&1"

@@ -1,0 +1,55 @@
+# Needs the fused meshes: an object's own, and for filling those of the held cups.
+# Makes simulate/<experiment>/<object>/trials.parquet: what was poured, and what happened.
+# How: Bullet moves the containers and finds collisions, particles are the liquid. Progress goes to the terminal and to the log.
+
+HELD = config["simulate"]["filling"]["held_objects"]
+
+
+rule simulate_pouring:
+    input:
+        mesh=rules.fuse.output.mesh,
+    output:
+        trials=f"{PROCESSED}/simulate/pouring/{{object}}/trials.parquet",
+    log:
+        "logs/simulate/pouring/{object}.log",
+    benchmark:
+        "benchmarks/simulate/pouring/{object}.tsv"
+    threads: 1
+    params:
+        shared=options("simulate", "spacing_m", "seed"),
+        options=options("simulate.pouring", "trials", "fill_min", "fill_max", "tilt_max_deg", "threshold"),
+        code=code("pipeline.simulate"),
+    shell:
+        "python -m pipeline.simulate pouring --object {wildcards.object} --mesh {input.mesh:q} --trials-table {output.trials:q}"
+        " {params.shared} {params.options} 2>&1 | tee {log:q} >&2"
+
+
+rule simulate_filling:
+    input:
+        mesh=rules.fuse.output.mesh,
+        held=expand(rules.fuse.output.mesh, object=HELD),
+    output:
+        trials=f"{PROCESSED}/simulate/filling/{{object}}/trials.parquet",
+    log:
+        "logs/simulate/filling/{object}.log",
+    benchmark:
+        "benchmarks/simulate/filling/{object}.tsv"
+    threads: 1
+    params:
+        # The order of the cups decides which one a trial draws.
+        held=" ".join(f"{name}={PROCESSED}/fuse/{name}/mesh.ply" for name in HELD),
+        shared=options("simulate", "spacing_m", "seed"),
+        options=options(
+            "simulate.filling",
+            "trials",
+            "held_particles",
+            "tilt_deg",
+            "offset_max_radii",
+            "height_min",
+            "height_max",
+            "free_room_max_particles",
+        ),
+        code=code("pipeline.simulate"),
+    shell:
+        "python -m pipeline.simulate filling --object {wildcards.object} --mesh {input.mesh:q} --held {params.held}"
+        " --trials-table {output.trials:q} {params.shared} {params.options} 2>&1 | tee {log:q} >&2"
