@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 STYLES = {"same": "--", "novel": "-"}
-FEATURES = ("label_mapping", "point_mapping", "standard", "hydrostatic")
+# Wide lines first: where two curves coincide, both are seen.
+WIDTHS = {"label_mapping": 2.4, "standard": 1.2, "point_mapping": 0.9, "hydrostatic": 1.0}
 
 
 def main() -> None:
@@ -65,7 +66,7 @@ def draw(curves: "pd.DataFrame", scores: "pd.DataFrame") -> "Figure":
 def _panel(axis: "Axes", means: "pd.DataFrame", scores: "pd.DataFrame") -> None:
     from pipeline.report.style import COLOURS, WORDS
 
-    for features in FEATURES:
+    for features, width in WIDTHS.items():
         for split, line in STYLES.items():
             curve = means[(means["features"] == features) & (means["split"] == split)].sort_values("fpr")
             # The ceiling learns nothing: its curves on one object and on the others are the same trials, once over.
@@ -79,7 +80,7 @@ def _panel(axis: "Axes", means: "pd.DataFrame", scores: "pd.DataFrame") -> None:
             )
             style = ":" if features == "hydrostatic" else line
             axis.step(
-                curve["fpr"], curve["mean"], style, where="post", color=COLOURS[features], lw=1.2, label=label
+                curve["fpr"], curve["mean"], style, where="post", color=COLOURS[features], lw=width, label=label
             )
             if split == "novel" and features != "hydrostatic":
                 axis.fill_between(
