@@ -80,7 +80,13 @@ def _panel(axis: "Axes", means: "pd.DataFrame", scores: "pd.DataFrame") -> None:
             )
             style = ":" if features == "hydrostatic" else line
             axis.step(
-                curve["fpr"], curve["mean"], style, where="post", color=COLOURS[features], lw=width, label=label
+                curve["fpr"],
+                curve["mean"],
+                style,
+                where="post",
+                color=COLOURS[features],
+                lw=width,
+                label=label,
             )
             if split == "novel" and features != "hydrostatic":
                 axis.fill_between(
