@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from sklearn.pipeline import Pipeline
 
 from pipeline.classify.regression import FPR_GRID, Score, classifier, iterations, score, separable
 from pipeline.errors import PipelineError
@@ -67,47 +66,47 @@ def evaluate(
     All feature sets see the same draws. The draws of an object depend on its name and the seed alone.
     """
     results = Results()
-    experiment = str(trials["experiment"].iloc[0])
-    objects, labels = trials["object"].to_numpy(), trials[label].to_numpy(bool)
-    for training_object in pd.unique(trials["object"]):
-        own = np.flatnonzero(objects == training_object)
-        for draw in range(draws):
-            key = (seed, zlib.crc32(f"{experiment}/{training_object}".encode()), draw)
-            chosen, redrawn = draw_training_set(
-                labels[own], samples, key, name=f"{experiment}/{training_object}"
-            )
-            rows = own[chosen]
-            for features, values in feature_sets.items():
-                fitted = classifier(ridge).fit(values[rows], labels[rows])
-                steps, converged = iterations(fitted)
-                training = {
-                    "n_iterations": steps,
-                    "converged": converged,
-                    "n_redrawn": redrawn,
-                    "separable": separable(values[rows], labels[rows]),
-                }
-                head = {"experiment": experiment, "features": features}
-                _test(results, fitted, head, draw, trials, values, labels, rows, training)
+    labels = trials[label].to_numpy(bool)
+    for head, rows, redrawn in _training_sets(trials, labels, samples, draws, seed):
+        for features, values in feature_sets.items():
+            fitted = classifier(ridge).fit(values[rows], labels[rows])
+            n_iterations, converged = iterations(fitted)
+            training = {
+                **{"n_iterations": n_iterations, "converged": converged, "n_redrawn": redrawn},
+                "separable": separable(values[rows], labels[rows]),
+            }
+            probability = fitted.predict_proba(values)[:, 1]
+            _test(results, {**head, "features": features}, trials, labels, probability, rows, training)
     return results
+
+
+def _training_sets(
+    trials: pd.DataFrame, labels: np.ndarray, samples: int, draws: int, seed: int
+) -> Iterator[tuple[dict[str, Any], np.ndarray, int]]:
+    """Yield for each object and draw: what it is called, the rows drawn, and how often they were redrawn."""
+    experiment = str(trials["experiment"].iloc[0])
+    for name in pd.unique(trials["object"]):
+        own = np.flatnonzero(trials["object"] == name)
+        for draw in range(draws):
+            key = (seed, zlib.crc32(f"{experiment}/{name}".encode()), draw)
+            chosen, redrawn = draw_training_set(labels[own], samples, key, name=f"{experiment}/{name}")
+            yield {"experiment": experiment, "training_object": name, "draw": draw}, own[chosen], redrawn
 
 
 def _test(
     results: Results,
-    fitted: Pipeline,
     head: dict[str, Any],
-    draw: int,
     trials: pd.DataFrame,
-    values: np.ndarray,
     labels: np.ndarray,
+    probability: np.ndarray,
     training_rows: np.ndarray,
     training: dict[str, Any],
 ) -> None:
-    training_object = trials["object"].iloc[training_rows[0]]
-    probability = fitted.predict_proba(values)[:, 1]
-    for split, rows in _splits(trials["object"].to_numpy(), training_object, training_rows):
-        full = {**head, "split": split, "training_object": training_object, "draw": draw}
+    objects = trials["object"].to_numpy()
+    for split, rows in _splits(objects, head["training_object"], training_rows):
+        full = {**head, "split": split}
         results.add_score(full, score(labels[rows], probability[rows]), labels[rows], training)
-        tested = {"test_object": trials["object"].to_numpy()[rows], "trial": trials["trial"].to_numpy()[rows]}
+        tested = {"test_object": objects[rows], "trial": trials["trial"].to_numpy()[rows]}
         outcome = {"probability": probability[rows].astype(np.float32), "label": labels[rows]}
         results.predictions.append(pd.DataFrame({**full, **tested, **outcome}))
 
