@@ -15,6 +15,7 @@ rule all:
     input:
         "reports/roc.pdf",
         "reports/metrics.json",
+        "reports/labels.pdf",
 
 
 include: "workflow/rules/scan.smk"

@@ -18,13 +18,13 @@ def _each(rule: str, objects=frozenset(OBJECTS)) -> set[str]:
 
 
 SIMULATED = _each("simulate_pouring") | _each("simulate_filling") | CLASSIFIED
-WARPED = _each("warp") | _each("parametrise") | ASSEMBLED | CLASSIFIED
+WARPED = _each("warp") | _each("parametrise") | ASSEMBLED | CLASSIFIED | {"draw_labels"}
 
 
 def _of_one(name: str) -> set[str]:
     """Return all that follows from the scan of an object that is neither source nor held."""
     stages = ("fuse", "label", "warp", "parametrise", "simulate_pouring", "simulate_filling")
-    return {f"{stage} {name}" for stage in stages} | ASSEMBLED | CLASSIFIED
+    return {f"{stage} {name}" for stage in stages} | ASSEMBLED | CLASSIFIED | {"draw_labels"}
 
 
 def _runs(project) -> list:
@@ -163,7 +163,7 @@ def test_an_object_is_dropped_and_taken_away_again(project):
 
     (project / "data/raw/my_cup/cup.ply").unlink()
     (project / "data/raw/my_cup").rmdir()
-    assert project.planned() == ASSEMBLED | CLASSIFIED
+    assert project.planned() == ASSEMBLED | CLASSIFIED | {"draw_labels"}
     assert project.call().returncode == 0
     after = project.contents()
     assert [path for path in before if before[path] != after.get(path)] == []

@@ -1,5 +1,5 @@
 # Needs the curves and scores of both experiments; for the numbers also what every stage made, and the demonstration objects' truth.
-# Makes reports/roc.pdf (the paper's Fig. 3) and reports/metrics.json (every headline number).
+# Makes reports/roc.pdf (the paper's Fig. 3) with reports/metrics.json (every headline number), and reports/labels.pdf (Fig. 2).
 # How: one module a figure; truth is compared here and nowhere else.
 
 
@@ -32,3 +32,23 @@ rule report:
         "python -m pipeline.report.roc --curves {input.curves:q} --scores {input.scores:q} --output {output.roc:q} > {log:q} 2>&1\n"
         "python -m pipeline.report.metrics --processed {params.processed:q} --source {params.source} --objects {params.objects}"
         " --output {output.metrics:q} >> {log:q} 2>&1"
+
+
+TARGETS = [name for name in OBJECTS if name != SOURCE]
+
+
+rule draw_labels:
+    input:
+        source=expand(rules.label.output.labels, object=SOURCE),
+        initial=expand(rules.label.output.labels, object=TARGETS),
+        final=each(rules.warp.output.label, TARGETS),
+    output:
+        figure=f"{REPORTS}/labels.pdf",
+    log:
+        "logs/report/labels.log",
+    threads: 1
+    params:
+        code=code("pipeline.report.labels"),
+    shell:
+        "python -m pipeline.report.labels --source-labels {input.source:q} --target-labels {input.initial:q}"
+        " --label-mappings {input.final:q} --output {output.figure:q} > {log:q} 2>&1"
