@@ -1,5 +1,6 @@
 # Needs the curves and scores of both experiments; for the numbers also what every stage made, and the demonstration objects' truth.
-# Makes reports/roc.pdf (the paper's Fig. 3) and reports/metrics.json (every headline number).
+# Makes reports/roc.pdf (the paper's Fig. 3) and reports/metrics.json (every headline number); when asked for, reports/physics.pdf and
+#       reports/physics.json, the liquid against hydrostatics.
 # How: one module a figure; truth is compared here and nowhere else.
 
 
@@ -32,3 +33,20 @@ rule report:
         "python -m pipeline.report.roc --curves {input.curves:q} --scores {input.scores:q} --output {output.roc:q} > {log:q} 2>&1\n"
         "python -m pipeline.report.metrics --processed {params.processed:q} --source {params.source} --objects {params.objects}"
         " --output {output.metrics:q} >> {log:q} 2>&1"
+
+
+rule report_physics:
+    input:
+        measurements=[rules.physics_references.output[0], *each(rules.physics_object.output[0])],
+        trials=[*each(rules.simulate_pouring.output.trials), *each(rules.simulate_filling.output.trials)],
+    output:
+        page=f"{REPORTS}/physics.pdf",
+        numbers=f"{REPORTS}/physics.json",
+    log:
+        "logs/report/physics.log",
+    threads: 1
+    params:
+        code=code("pipeline.report.physics"),
+    shell:
+        "python -m pipeline.report.physics --measurements {input.measurements:q} --trials {input.trials:q}"
+        " --page {output.page:q} --numbers {output.numbers:q} > {log:q} 2>&1"

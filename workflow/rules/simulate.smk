@@ -1,5 +1,6 @@
 # Needs the fused meshes: an object's own, and for filling those of the held cups.
-# Makes simulate/<experiment>/<object>/trials.parquet: what was poured, and what happened.
+# Makes simulate/<experiment>/<object>/trials.parquet: what was poured, and what happened; for the page on the liquid's physics also
+#       simulate/physics/: the liquid measured in vessels of known shape and in each object.
 # How: Bullet moves the containers and finds collisions, particles are the liquid. Progress goes to the terminal and to the log.
 
 HELD = config["simulate"]["filling"]["held_objects"]
@@ -53,3 +54,43 @@ rule simulate_filling:
     shell:
         "python -m pipeline.simulate filling --object {wildcards.object} --mesh {input.mesh:q} --held {params.held}"
         " --trials-table {output.trials:q} {params.shared} {params.options} 2>&1 | tee {log:q} >&2"
+
+
+rule physics_references:
+    output:
+        measurements=f"{PROCESSED}/simulate/physics/references.parquet",
+    log:
+        "logs/simulate/physics/references.log",
+    benchmark:
+        "benchmarks/simulate/physics/references.tsv"
+    threads: 1
+    params:
+        shared=options("simulate", "spacing_m", "seed"),
+        code=code("pipeline.simulate.physics"),
+    shell:
+        "python -m pipeline.simulate.physics references --measurements {output.measurements:q} {params.shared} > {log:q} 2>&1"
+
+
+rule physics_object:
+    input:
+        mesh=rules.fuse.output.mesh,
+        pouring=rules.simulate_pouring.output.trials,
+        filling=rules.simulate_filling.output.trials,
+        held=expand(rules.fuse.output.mesh, object=HELD),
+    output:
+        measurements=f"{PROCESSED}/simulate/physics/{{object}}/measurements.parquet",
+    log:
+        "logs/simulate/physics/{object}.log",
+    benchmark:
+        "benchmarks/simulate/physics/{object}.tsv"
+    threads: 1
+    params:
+        held=rules.simulate_filling.params.held,
+        shared=options("simulate", "spacing_m", "seed"),
+        threshold=options("simulate.pouring", "threshold"),
+        options=options("simulate.physics", "convergence_trials"),
+        code=code("pipeline.simulate.physics"),
+    shell:
+        "python -m pipeline.simulate.physics object --object {wildcards.object} --mesh {input.mesh:q} --pouring {input.pouring:q}"
+        " --filling {input.filling:q} --held {params.held} --measurements {output.measurements:q} {params.shared} {params.threshold}"
+        " {params.options} 2>&1 | tee {log:q} >&2"

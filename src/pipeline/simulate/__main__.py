@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 
 from pipeline import artefacts, command
-from pipeline.errors import PipelineError
 
 
 def main() -> None:
@@ -91,20 +90,11 @@ def _filling(options: argparse.Namespace) -> list[dict]:
     second = trials.container(options.object, *artefacts.read_mesh(options.mesh), options.spacing_m)
     held = [
         trials.container(name, *artefacts.read_mesh(path), options.spacing_m)
-        for name, path in map(_name_and_path, options.held)
+        for name, path in map(command.name_and_path, options.held)
     ]
     numbers = command.progress(range(options.trials), options.trials, f"filling {options.object}")
     with trials.FillingExperiment(second, held, protocol) as experiment:
         return [experiment.trial(number, options.seed) for number in numbers]
-
-
-def _name_and_path(text: str) -> tuple[str, Path]:
-    name, equals, path = text.partition("=")
-    if not (name and equals and path):
-        raise PipelineError(
-            f"--held {text}: expected NAME=MESH, such as mug=data/processed/fuse/mug/mesh.ply"
-        )
-    return name, Path(path)
 
 
 if __name__ == "__main__":
