@@ -1,6 +1,6 @@
 # Needs the curves and scores of both experiments; for the numbers also what every stage made, and the demonstration objects' truth.
 # Makes reports/roc.pdf (the paper's Fig. 3) and reports/metrics.json (every headline number); when asked for, reports/physics.pdf and
-#       reports/physics.json, the liquid against hydrostatics.
+#       reports/physics.json, the liquid against hydrostatics and against Bullet's spheres.
 # How: one module a figure; truth is compared here and nowhere else.
 
 
@@ -39,6 +39,10 @@ rule report_physics:
     input:
         measurements=[rules.physics_references.output[0], *each(rules.physics_object.output[0])],
         trials=[*each(rules.simulate_pouring.output.trials), *each(rules.simulate_filling.output.trials)],
+        others=[
+            *each(rules.simulate_pouring_other.output.trials),
+            *each(rules.simulate_filling_other.output.trials),
+        ],
     output:
         page=f"{REPORTS}/physics.pdf",
         numbers=f"{REPORTS}/physics.json",
@@ -46,7 +50,8 @@ rule report_physics:
         "logs/report/physics.log",
     threads: 1
     params:
+        options=options("simulate", "engine"),
         code=code("pipeline.report.physics"),
     shell:
         "python -m pipeline.report.physics --measurements {input.measurements:q} --trials {input.trials:q}"
-        " --page {output.page:q} --numbers {output.numbers:q} > {log:q} 2>&1"
+        " --other-trials {input.others:q} --page {output.page:q} --numbers {output.numbers:q} {params.options} > {log:q} 2>&1"

@@ -41,10 +41,13 @@ def main() -> None:
 
 
 def compared(liquid: "pd.DataFrame", bullet: "pd.DataFrame") -> "pd.DataFrame":
-    """Return the trials that both engines ran: label_liquid, label_bullet, tilt and hydrostatic margin."""
+    """Return the trials that both engines ran: label_liquid, label_bullet, tilt and hydrostatic margin.
+
+    The same draw of the same trial: a draw that is void for one engine alone is another trial for the other.
+    """
     import pandas as pd
 
-    keys = ["experiment", "object", "trial"]
+    keys = ["experiment", "object", "trial", "seed", "n_void"]
     merged = liquid.merge(bullet, on=keys, suffixes=("_liquid", "_bullet"))
     merged = merged[~merged["failed_liquid"] & ~merged["failed_bullet"]]
     pouring = merged["experiment"] == "pouring"
