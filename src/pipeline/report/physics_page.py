@@ -30,7 +30,7 @@ def draw(checks: "pd.DataFrame", trials: "pd.DataFrame", both: "pd.DataFrame") -
         {**RC, "font.size": 7, "axes.labelsize": 7, "axes.titlesize": 8, "legend.fontsize": 6}
     ):
         figure = plt.figure(figsize=(8.27, 11.69))
-        grid = figure.add_gridspec(5, 3, left=0.09, right=0.98, top=0.97, bottom=0.05, hspace=0.6, wspace=0.4)
+        grid = figure.add_gridspec(5, 3, left=0.11, right=0.98, top=0.97, bottom=0.05, hspace=0.6, wspace=0.4)
         panels = (rest_density, rest_level, rest_speed, spill)
         for number, panel in enumerate(panels):
             panel(figure.add_subplot(grid[number // 3, number % 3]), checks)
@@ -55,8 +55,8 @@ def rest_density(axis: "Axes", checks: "pd.DataFrame") -> None:
     axis.axhline(3.0, color=GREY, lw=0.8, ls="--")
     _thin(axis)
     axis.set(title="Density at rest", xlabel="particles", ylabel="mean |density − 1| (%)")
-    axis.set_ylim(bottom=0.0)
-    axis.legend(frameon=False)
+    axis.set_ylim(0.0, 1.25 * max(3.0, axis.get_ylim()[1]))
+    axis.legend(frameon=False, ncol=3, loc="upper center", handlelength=1.2, columnspacing=0.8)
 
 
 def rest_level(axis: "Axes", checks: "pd.DataFrame") -> None:
@@ -150,7 +150,7 @@ def pouring_density(axis: "Axes", trials: "pd.DataFrame") -> None:
 def _retained(figure: "Figure", grid: "GridSpec", checks: "pd.DataFrame", objects: list[str]) -> None:
     """What a brimful object keeps while it is tilted slowly: measured, and by hydrostatics."""
     columns = max(1, int(np.ceil(len(objects) / 2)))
-    small = grid[2, :].subgridspec(2, columns, hspace=0.55, wspace=0.12)
+    small = grid[2, :].subgridspec(2, columns, hspace=0.85, wspace=0.14)
     rows = checks[checks["check"] == "retained"]
     for number, name in enumerate(objects):
         axis = figure.add_subplot(small[number // columns, number % columns])
@@ -184,9 +184,9 @@ def again(axis: "Axes", checks: "pd.DataFrame") -> None:
             axis.plot(share, at, ls="none", marker=marker, ms=3.5, color=colour, mfc="none", label=label)
     axis.axvline(97.0, color=GREY, lw=0.8, ls="--")
     _named(axis, names)
-    axis.set_ylim(top=len(names) + 3.2)
+    axis.set_ylim(top=1.6 * len(names) + 1.0)
     axis.set(title="Trials run again", xlabel="labels that agree (%)")
-    axis.legend(frameon=False, fontsize=5.5, loc="upper center")
+    axis.legend(frameon=False, fontsize=5.5, loc="upper left", handletextpad=0.0, borderpad=0.0)
 
 
 def again_where(axis: "Axes", checks: "pd.DataFrame", trials: "pd.DataFrame") -> None:
@@ -277,9 +277,7 @@ def _by_vessel(checks: "pd.DataFrame", check: str):
 
 def _thin(axis: "Axes") -> None:
     axis.axvspan(0, THICK, color="0.93", lw=0, zorder=0)
-    axis.text(
-        THICK * 0.5, 0.97, "thin", transform=axis.get_xaxis_transform(), ha="center", va="top", fontsize=6
-    )
+    axis.text(THICK * 0.5, 0.03, "thin", transform=axis.get_xaxis_transform(), ha="center", fontsize=6)
     axis.set_xlim(left=0.0)
 
 
