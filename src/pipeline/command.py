@@ -4,6 +4,7 @@ import argparse
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
 from typing import TypeVar
 
 from pipeline.errors import PipelineError
@@ -42,3 +43,13 @@ def progress(items: Iterable[T], total: int, what: str, every_s: float = 5.0) ->
             said, rate = now, done / (now - start)
             say(f"{what}: {done}/{total} ({rate:.1f}/s, {(total - done) / rate:.0f} s left)")
         yield item
+
+
+def name_and_path(text: str) -> tuple[str, Path]:
+    """Return both halves of an option such as --held NAME=MESH."""
+    name, equals, path = text.partition("=")
+    if not (name and equals and path):
+        raise PipelineError(
+            f"--held {text}: expected NAME=MESH, such as mug=data/processed/fuse/mug/mesh.ply"
+        )
+    return name, Path(path)

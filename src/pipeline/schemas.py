@@ -68,6 +68,13 @@ TABLES = {
         + _floats("density_error", "hydrostatic_margin")
         + [("poured", pa.bool_()), ("filled", pa.bool_()), ("failed", pa.bool_())]
     ),
+    # Checks of the liquid; what x, measured and expected are is said at each check (simulate.measures, .convergence).
+    "physics": pa.schema(
+        _strings("check", "vessel")
+        + _floats("spacing_m")
+        + _integers("n_particles")
+        + _floats("x", "measured", "expected")
+    ),
     # One row a tested trial of a classifier; `trial` counts within `test_object`.
     "predictions": pa.schema(
         [

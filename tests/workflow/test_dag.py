@@ -79,6 +79,8 @@ def test_one_core_gives_the_same_bytes_as_two(finished, unfinished):
         ("warp.k", 2, WARPED),
         ("parametrise.hull_points", 3000, _each("parametrise") | ASSEMBLED | CLASSIFIED),
         ("simulate.seed", 40, SIMULATED),
+        ("simulate.engine", "bullet", SIMULATED),
+        ("simulate.physics.convergence_trials", 3, set()),
         ("simulate.pouring.tilt_max_deg", 90.0, _each("simulate_pouring") | {"classify pouring", "report"}),
         ("simulate.filling.tilt_deg", 90.0, _each("simulate_filling") | {"classify filling", "report"}),
         (
@@ -93,6 +95,17 @@ def test_one_core_gives_the_same_bytes_as_two(finished, unfinished):
 def test_a_changed_key_reruns_what_depends_on_it(project, key, value, jobs):
     project.configure(key, value)
     assert project.planned() == jobs
+
+
+def test_the_page_on_physics_is_made_when_it_is_asked_for(project):
+    """And the engine that it compares with is the other one."""
+    others = _each("simulate_pouring_other") | _each("simulate_filling_other")
+    page = _each("physics_object") | others | {"physics_references", "report_physics"}
+    assert project.planned("reports/physics.pdf") == page
+    told = project.call("-n", "-p", "reports/physics.pdf")
+    assert told.stdout.count("--engine bullet --") == len(others)
+    project.configure("simulate.engine", "bullet")
+    assert project.call("-n", "-p", "reports/physics.pdf").stdout.count("--engine liquid --") == len(others)
 
 
 def test_two_keys_that_swap_their_values_are_a_change(project):

@@ -1,5 +1,6 @@
 # Needs the curves and scores of both experiments; for the numbers also what every stage made, and the demonstration objects' truth.
-# Makes reports/roc.pdf (the paper's Fig. 3) with reports/metrics.json (every headline number), and reports/labels.pdf (Fig. 2).
+# Makes reports/roc.pdf (the paper's Fig. 3) with reports/metrics.json (every headline number), and reports/labels.pdf (Fig. 2);
+#       when asked for, reports/physics.pdf and reports/physics.json, the liquid against hydrostatics and against Bullet's spheres.
 # How: one module a figure; truth is compared here and nowhere else.
 
 
@@ -52,3 +53,25 @@ rule draw_labels:
     shell:
         "python -m pipeline.report.labels --source-labels {input.source:q} --target-labels {input.initial:q}"
         " --label-mappings {input.final:q} --output {output.figure:q} > {log:q} 2>&1"
+
+
+rule report_physics:
+    input:
+        measurements=[rules.physics_references.output[0], *each(rules.physics_object.output[0])],
+        trials=[*each(rules.simulate_pouring.output.trials), *each(rules.simulate_filling.output.trials)],
+        others=[
+            *each(rules.simulate_pouring_other.output.trials),
+            *each(rules.simulate_filling_other.output.trials),
+        ],
+    output:
+        page=f"{REPORTS}/physics.pdf",
+        numbers=f"{REPORTS}/physics.json",
+    log:
+        "logs/report/physics.log",
+    threads: 1
+    params:
+        options=options("simulate", "engine"),
+        code=code("pipeline.report.physics"),
+    shell:
+        "python -m pipeline.report.physics --measurements {input.measurements:q} --trials {input.trials:q}"
+        " --other-trials {input.others:q} --page {output.page:q} --numbers {output.numbers:q} {params.options} > {log:q} 2>&1"

@@ -1,8 +1,12 @@
 # Needs the fused meshes: an object's own, and for filling those of the held cups.
-# Makes simulate/<experiment>/<object>/trials.parquet: what was poured, and what happened.
+# Makes simulate/<experiment>/<object>/trials.parquet: what was poured, and what happened; for the page on the liquid's physics also
+#       simulate/physics/: the liquid measured in vessels of known shape and in each object.
 # How: Bullet moves the containers and finds collisions, particles are the liquid. Progress goes to the terminal and to the log.
 
 HELD = config["simulate"]["filling"]["held_objects"]
+# The page on physics compares: it has the first trials of each object run by the engine that the others are not run by.
+OTHER_ENGINE = {"liquid": "bullet", "bullet": "liquid"}[config["simulate"]["engine"]]
+OTHER_TRIALS = config["simulate"]["physics"]["engine_trials"]
 
 
 rule simulate_pouring:
@@ -16,7 +20,7 @@ rule simulate_pouring:
         "benchmarks/simulate/pouring/{object}.tsv"
     threads: 1
     params:
-        shared=options("simulate", "spacing_m", "seed"),
+        shared=options("simulate", "engine", "spacing_m", "seed"),
         options=options("simulate.pouring", "trials", "fill_min", "fill_max", "tilt_max_deg", "threshold"),
         code=code("pipeline.simulate"),
     shell:
@@ -38,7 +42,7 @@ rule simulate_filling:
     params:
         # The order of the cups decides which one a trial draws.
         held=" ".join(f"{name}={PROCESSED}/fuse/{name}/mesh.ply" for name in HELD),
-        shared=options("simulate", "spacing_m", "seed"),
+        shared=options("simulate", "engine", "spacing_m", "seed"),
         options=options(
             "simulate.filling",
             "trials",
@@ -53,3 +57,80 @@ rule simulate_filling:
     shell:
         "python -m pipeline.simulate filling --object {wildcards.object} --mesh {input.mesh:q} --held {params.held}"
         " --trials-table {output.trials:q} {params.shared} {params.options} 2>&1 | tee {log:q} >&2"
+
+
+rule physics_references:
+    output:
+        measurements=f"{PROCESSED}/simulate/physics/references.parquet",
+    log:
+        "logs/simulate/physics/references.log",
+    benchmark:
+        "benchmarks/simulate/physics/references.tsv"
+    threads: 1
+    params:
+        shared=options("simulate", "spacing_m", "seed"),
+        code=code("pipeline.simulate.physics"),
+    shell:
+        "python -m pipeline.simulate.physics references --measurements {output.measurements:q} {params.shared} > {log:q} 2>&1"
+
+
+rule physics_object:
+    input:
+        mesh=rules.fuse.output.mesh,
+        pouring=rules.simulate_pouring.output.trials,
+        filling=rules.simulate_filling.output.trials,
+        held=expand(rules.fuse.output.mesh, object=HELD),
+    output:
+        measurements=f"{PROCESSED}/simulate/physics/{{object}}/measurements.parquet",
+    log:
+        "logs/simulate/physics/{object}.log",
+    benchmark:
+        "benchmarks/simulate/physics/{object}.tsv"
+    threads: 1
+    params:
+        held=rules.simulate_filling.params.held,
+        shared=options("simulate", "spacing_m", "seed"),
+        threshold=options("simulate.pouring", "threshold"),
+        options=options("simulate.physics", "convergence_trials"),
+        code=code("pipeline.simulate.physics"),
+    shell:
+        "python -m pipeline.simulate.physics object --object {wildcards.object} --mesh {input.mesh:q} --pouring {input.pouring:q}"
+        " --filling {input.filling:q} --held {params.held} --measurements {output.measurements:q} {params.shared} {params.threshold}"
+        " {params.options} 2>&1 | tee {log:q} >&2"
+
+
+use rule simulate_pouring as simulate_pouring_other with:
+    output:
+        trials=f"{PROCESSED}/simulate/physics/{{object}}/{OTHER_ENGINE}/pouring.parquet",
+    log:
+        f"logs/simulate/physics/{{object}}_{OTHER_ENGINE}_pouring.log",
+    benchmark:
+        f"benchmarks/simulate/physics/{{object}}_{OTHER_ENGINE}_pouring.tsv"
+    params:
+        shared=options("simulate", "spacing_m", "seed") + f" --engine {OTHER_ENGINE}",
+        options=options("simulate.pouring", "fill_min", "fill_max", "tilt_max_deg", "threshold")
+        + f" --trials {OTHER_TRIALS}",
+        code=code("pipeline.simulate"),
+
+
+use rule simulate_filling as simulate_filling_other with:
+    output:
+        trials=f"{PROCESSED}/simulate/physics/{{object}}/{OTHER_ENGINE}/filling.parquet",
+    log:
+        f"logs/simulate/physics/{{object}}_{OTHER_ENGINE}_filling.log",
+    benchmark:
+        f"benchmarks/simulate/physics/{{object}}_{OTHER_ENGINE}_filling.tsv"
+    params:
+        held=rules.simulate_filling.params.held,
+        shared=options("simulate", "spacing_m", "seed") + f" --engine {OTHER_ENGINE}",
+        options=options(
+            "simulate.filling",
+            "held_particles",
+            "tilt_deg",
+            "offset_max_radii",
+            "height_min",
+            "height_max",
+            "free_room_max_particles",
+        )
+        + f" --trials {OTHER_TRIALS}",
+        code=code("pipeline.simulate"),

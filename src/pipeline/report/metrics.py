@@ -131,6 +131,7 @@ def trial_metrics(processed: Path, experiment: str, objects: list[str]) -> Metri
 
     path = processed / "simulate" / experiment
     trials = pd.concat([read_table(path / name / "trials.parquet", "trials") for name in objects])
+    well = trials[~trials["failed"]]
     label, head = EXPERIMENTS[experiment], f"simulate.{experiment}"
     metrics = {
         f"{head}.trials": len(trials),
@@ -139,13 +140,13 @@ def trial_metrics(processed: Path, experiment: str, objects: list[str]) -> Metri
         f"{head}.void_share": float(trials["n_void"].sum() / (trials["n_void"].sum() + len(trials))),
         f"{head}.density_error_mean": float(trials["density_error"].mean()),
         f"{head}.agreement_with_hydrostatics": float(
-            ((trials["hydrostatic_margin"] > 0.0) == trials[label]).mean()
+            ((well["hydrostatic_margin"] > 0.0) == well[label]).mean()
         ),
     }
-    shares = trials.groupby("object", observed=True)[label].mean()
+    shares = well.groupby("object", observed=True)[label].mean()
     metrics |= {f"{head}.{name}.positive_share": float(share) for name, share in shares.items()}
     if experiment == "filling":
-        halves = trials.groupby("half", observed=True)[label].mean()
+        halves = well.groupby("half", observed=True)[label].mean()
         metrics |= {f"{head}.{half}.positive_share": float(share) for half, share in halves.items()}
     return metrics
 

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 
 from pipeline import artefacts, command
-from pipeline.errors import PipelineError
 
 
 def main() -> None:
@@ -38,6 +37,9 @@ def _options() -> argparse.Namespace:
         experiment.add_argument(
             "--trials-table", type=Path, required=True, help="where the trials are written"
         )
+        experiment.add_argument(
+            "--engine", default="liquid", help="what is poured: liquid, or bullet's spheres"
+        )
         experiment.add_argument("--spacing-m", type=float, default=0.010, help="particle spacing")
         experiment.add_argument("--seed", type=int, default=4, help="of the whole experiment")
         experiment.add_argument("--trials", type=int, default=1000, help="number of trials")
@@ -67,19 +69,21 @@ def _options() -> argparse.Namespace:
 
 
 def _pouring(options: argparse.Namespace) -> list[dict]:
-    from pipeline.simulate import draws, trials
+    from pipeline.simulate import draws, engines, trials
 
+    engine = engines.engine(options.engine)
     protocol = draws.Pouring(
         options.fill_min, options.fill_max, float(np.radians(options.tilt_max_deg)), options.threshold
     )
-    cup = trials.container(options.object, *artefacts.read_mesh(options.mesh), options.spacing_m)
+    cup = trials.container(options.object, *artefacts.read_mesh(options.mesh), options.spacing_m, engine)
     numbers = command.progress(range(options.trials), options.trials, f"pouring {options.object}")
     return [trials.pouring_trial(cup, protocol, number, options.seed) for number in numbers]
 
 
 def _filling(options: argparse.Namespace) -> list[dict]:
-    from pipeline.simulate import draws, trials
+    from pipeline.simulate import draws, engines, trials
 
+    engine = engines.engine(options.engine)
     protocol = draws.Filling(
         held_particles=options.held_particles,
         tilt_rad=float(np.radians(options.tilt_deg)),
@@ -88,23 +92,14 @@ def _filling(options: argparse.Namespace) -> list[dict]:
         height_max=options.height_max,
         free_room_max_particles=options.free_room_max_particles,
     )
-    second = trials.container(options.object, *artefacts.read_mesh(options.mesh), options.spacing_m)
+    second = trials.container(options.object, *artefacts.read_mesh(options.mesh), options.spacing_m, engine)
     held = [
-        trials.container(name, *artefacts.read_mesh(path), options.spacing_m)
-        for name, path in map(_name_and_path, options.held)
+        trials.container(name, *artefacts.read_mesh(path), options.spacing_m, engine)
+        for name, path in map(command.name_and_path, options.held)
     ]
     numbers = command.progress(range(options.trials), options.trials, f"filling {options.object}")
     with trials.FillingExperiment(second, held, protocol) as experiment:
         return [experiment.trial(number, options.seed) for number in numbers]
-
-
-def _name_and_path(text: str) -> tuple[str, Path]:
-    name, equals, path = text.partition("=")
-    if not (name and equals and path):
-        raise PipelineError(
-            f"--held {text}: expected NAME=MESH, such as mug=data/processed/fuse/mug/mesh.ply"
-        )
-    return name, Path(path)
 
 
 if __name__ == "__main__":

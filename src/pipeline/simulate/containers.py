@@ -52,7 +52,7 @@ class Containers:
 
     def add_second(self, vertices_m: np.ndarray, triangles: np.ndarray) -> int:
         """Add a static container by its mesh (V, 3), (F, 3) in its object frame; return Bullet's number of the body."""
-        vertices_m, triangles = _decimated(vertices_m, triangles)
+        vertices_m, triangles = decimated(vertices_m, triangles)
         shape = pybullet.createCollisionShape(
             pybullet.GEOM_MESH,
             vertices=vertices_m.tolist(),
@@ -193,7 +193,7 @@ def _obj(pieces: list[np.ndarray]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _decimated(vertices_m: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def decimated(vertices_m: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     import open3d as o3d
 
     mesh = o3d.geometry.TriangleMesh(

@@ -15,8 +15,8 @@ from pipeline.geometry import frames
 from pipeline.geometry.cavity import Cavity, cavity, retained_volume_m3
 from pipeline.simulate import draws, liquid
 from pipeline.simulate.containers import Containers
+from pipeline.simulate.engines import ENGINES, Engine
 from pipeline.simulate.rest import GRAVITY
-from pipeline.simulate.walls import Vessel, vessel
 
 Row = dict[str, Any]
 # Nine of ten placements may collide; a trial that needs more draws than this has a geometry that cannot work.
@@ -25,12 +25,13 @@ MAX_ATTEMPTS = 1000
 
 @dataclass(frozen=True)
 class Container:
-    """A container ready for trials: its mesh (object frame, metres), its cavity and the liquid's view of its walls."""
+    """A container ready for trials: its mesh (object frame, metres), its cavity, and how an engine sees both."""
 
     name: str
     vertices_m: np.ndarray
     triangles: np.ndarray
-    vessel: Vessel
+    vessel: Any
+    engine: Engine
     _kept_m3: dict[tuple[bytes, float], float] = field(default_factory=dict, repr=False, compare=False)
 
     @property
@@ -61,17 +62,26 @@ class Container:
         return self._kept_m3[key]
 
 
-def container(name: str, vertices_m: np.ndarray, triangles: np.ndarray, spacing_m: float) -> Container:
+def container(
+    name: str,
+    vertices_m: np.ndarray,
+    triangles: np.ndarray,
+    spacing_m: float,
+    engine: Engine = ENGINES["liquid"],
+) -> Container:
     """Prepare a fused mesh (V, 3), (F, 3) for trials; a `PipelineError` names the object if it cannot hold liquid."""
-    return Container(name, vertices_m, triangles, vessel(cavity(vertices_m, triangles, name=name), spacing_m))
+    room = cavity(vertices_m, triangles, name=name)
+    return Container(
+        name, vertices_m, triangles, engine.prepare(room, vertices_m, triangles, spacing_m), engine
+    )
 
 
 def pouring_trial(cup: Container, protocol: draws.Pouring, trial: int, seed: int) -> Row:
     """Run one pouring trial of a cup alone; return its row of the table "trials"."""
     own_seed = draws.trial_seed(seed, "pouring", cup.name, trial)
     draw = draws.draw_pouring(cup.cavity, protocol, draws.stream(own_seed, 0))
-    n = liquid.particles_for(cup.vessel, draw.fill_m3)
-    pour = liquid.pour(cup.vessel, n, draw.lip_m, draw.axis, draw.tilt_rad, own_seed)
+    n = cup.engine.particles_for(cup.vessel, draw.fill_m3)
+    pour = cup.engine.pour(cup.vessel, n, draw.lip_m, draw.axis, draw.tilt_rad, own_seed)
     kept_m3 = cup.kept_m3(draw.lip_m, draw.axis, draw.tilt_rad)
     return {
         **_identity(trial, own_seed, "pouring", cup.name, cup.name, "capacity"),
@@ -147,7 +157,7 @@ class FillingExperiment:
 
     def simulate(self, draw: draws.FillingDraw, number: int, seed: int) -> liquid.Filling:
         """Let the liquid flow from held cup `number` as drawn."""
-        return liquid.fill(
+        return self.second.engine.fill(
             self.held[number].vessel,
             self.second.vessel,
             draw.T_world_held,
@@ -156,7 +166,7 @@ class FillingExperiment:
             draw.axis_world,
             self.protocol.tilt_rad,
             self.protocol.held_particles,
-            liquid.particles_for(self.second.vessel, draw.second_fill_m3),
+            self.second.engine.particles_for(self.second.vessel, draw.second_fill_m3),
             seed,
         )
 
@@ -169,7 +179,7 @@ class FillingExperiment:
         filling: liquid.Filling,
         n_void: int,
     ) -> Row:
-        n_second = liquid.particles_for(self.second.vessel, draw.second_fill_m3)
+        n_second = self.second.engine.particles_for(self.second.vessel, draw.second_fill_m3)
         n_left = self.protocol.held_particles - filling.n_retained
         outside = filling.n_spilled + filling.n_retained
         return {
