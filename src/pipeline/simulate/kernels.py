@@ -14,7 +14,7 @@ from pipeline.simulate.lookup import rim_at, wall_distance, wall_reach
 
 WARM = 0.8  # share of the last step's pressure that the next one starts from
 RELAXATION = 0.5  # of the Jacobi iterations
-VISCOSITY = 0.1
+VISCOSITY = 0.8  # share of the neighbours' mean velocity taken over in a step (XSPH, Monaghan 1989)
 NEAREST = 0.4  # least distance of a particle from the wall, spacings
 BEYOND = 0.05  # a particle this many spacings beyond the wall after all corrections has leaked
 SPEED_LIMIT = 8.0  # m/s; a fall of 1 m ends at 4.4 m/s

@@ -19,6 +19,7 @@ TILT_S = 1.0
 WAIT_S = 1.5
 QUIET_S = 0.25
 QUIET_SPEED = 0.05  # m/s, root of the mean square
+BRINK = 0.3  # spacings: liquid that stands no lower than this below the rim may still begin to pour
 
 
 @dataclass(frozen=True)
@@ -151,6 +152,9 @@ def _pour(p, walls, lip, axis, tilt_rad, dt, steps, tilt_s, iterations, patient,
         if t >= tilt_s and k % 4 == 0 and not patient:
             level = spill_level(rim, np.float64(walls.lowered), up)
             reach, squares = can_reach(p, up, level)
-            if not reach or (t - max(last, tilt_s) > QUIET_S and squares < QUIET_SPEED**2):
+            quiet = t - max(last, tilt_s) > QUIET_S and squares < QUIET_SPEED**2
+            if quiet and left == 0:  # one late drop would change the label
+                quiet = not can_reach(p, up, level - BRINK * walls.spacing)[0]
+            if not reach or quiet:
                 break
     return left, leaked, True, error / max(dense, 1), taken

@@ -17,8 +17,17 @@ ITERATIONS = 3
 SETTLE_S = 1.2
 SETTLE_DAMPING = 0.05  # share of the velocity that a step takes away while settling
 HOLD_S = 0.1
+BRIMFUL, TOPPED = 0, -1  # keys among the settled states
 _LEVELS = 1.1
-_OVERFULL = 1.3
+_TOP_UP_FROM = 0.93  # of the capacity: a lattice that settles above this splashes over
+_TOP_UPS = 3
+_ROOM, _ROOM_SHARE = 10, 0.02  # between two top-ups: particles, or a share of the capacity
+_PORTIONS = 300  # a portion set down at once is this part of the capacity, one particle at least
+_PORTION_S = 0.08
+_SHAKES = 6
+_CALM_S = 0.4  # what would run over sooner or later has done so then
+_INNER = 0.6  # of the opening's radius
+_ABOVE = 0.8  # spacings from a particle on the surface to one set down on it
 _JITTER = 0.01  # spacings
 
 
@@ -42,18 +51,100 @@ def settle(vessel: Vessel, n: int, seed: int | tuple[int, ...]) -> np.ndarray:
         level = int(np.ceil(level * _LEVELS))
     at_rest = _brimful(vessel) if level > holds(vessel) else _settled(vessel, level)
     if len(at_rest) < n:  # a level just below the rim can splash over it while it settles
-        at_rest = _brimful(vessel)
-    lowest = at_rest[np.argsort(at_rest[:, 2], kind="stable")[:n]]
+        at_rest = _brimful(vessel) if n <= holds(vessel) else _topped(vessel)
+    lowest = _lowest(at_rest, n)
     return lowest + np.random.default_rng(seed).normal(0.0, _JITTER * vessel.spacing_m, lowest.shape)
 
 
 def holds(vessel: Vessel) -> int:
-    """Return how many particles stay when the vessel is filled until it overflows."""
+    """Return how many particles stay for good when the vessel is filled gently until it overflows."""
     return len(_brimful(vessel))
 
 
+def overflows_at(vessel: Vessel) -> int:
+    """Return how many particles are in the vessel just before the first runs over, when it is filled gently."""
+    return len(_topped(vessel))
+
+
 def _brimful(vessel: Vessel) -> np.ndarray:
-    return _settled(vessel, max(int(_OVERFULL * particles_for(vessel, vessel.cavity.capacity_m3)), 8))
+    """Return what of the topped-up state stays for good (m, 3); made once."""
+    if BRIMFUL not in vessel.settled:
+        vessel.settled[BRIMFUL] = _kept(vessel, _topped(vessel))
+    return vessel.settled[BRIMFUL]
+
+
+def _topped(vessel: Vessel) -> np.ndarray:
+    """Return what is there just before the first particle runs over (m, 3): the middle of some gentle top-ups; made once.
+
+    The first starts from a lattice, each other as a trial does: from the last one less the particles at its top.
+    """
+    if TOPPED not in vessel.settled:
+        target = particles_for(vessel, vessel.cavity.capacity_m3)
+        n = max(int(_TOP_UP_FROM * target), min(target, 8))
+        while len(_settled(vessel, n)) < n:  # it splashed over
+            n = len(vessel.settled[n]) - 1
+        states = [_topped_up(vessel, vessel.settled[n], 0)]
+        for turn in range(1, _TOP_UPS + 1):
+            room = max(_ROOM, round(_ROOM_SHARE * target))
+            states.append(_topped_up(vessel, _lowest(states[-1], max(len(states[-1]) - room, 1)), turn))
+        vessel.settled[TOPPED] = sorted(states[1:], key=len)[_TOP_UPS // 2]
+    return vessel.settled[TOPPED]
+
+
+def _lowest(at_rest: np.ndarray, n: int) -> np.ndarray:
+    return at_rest[np.argsort(at_rest[:, 2], kind="stable")[:n]]
+
+
+def _topped_up(vessel: Vessel, start: np.ndarray, turn: int) -> np.ndarray:
+    """Set particles down on the liquid, without speed, a few at a time, until one runs over; the state before (m, 3).
+
+    They come down on a golden spiral over the inner part of the opening; `turn` says where on it the first one does.
+    """
+    n, target = len(start), particles_for(vessel, vessel.cavity.capacity_m3)
+    p = particles(n + 2 * target + 16, vessel.walls)
+    p.x[:n], p.count[0] = start, n
+    dt, at_once = time_step_s(vessel), max(1, round(target / _PORTIONS))
+    rest(p, vessel.walls, dt, ITERATIONS, int(HOLD_S / dt), SETTLE_DAMPING)
+    before = p.x[: p.count[0]].astype(float)
+    for place in range(turn * 1000, turn * 1000 + target, at_once):
+        for k in range(at_once):
+            _set_down(p, vessel, place + k)
+        left, well = rest(p, vessel.walls, dt, ITERATIONS, int(_PORTION_S / dt), 0.0)
+        if left > 0 or not well:
+            break
+        before = p.x[: p.count[0]].astype(float)
+    return _calmed(vessel, before, _CALM_S, SETTLE_DAMPING)
+
+
+def _kept(vessel: Vessel, at_rest: np.ndarray) -> np.ndarray:
+    """Return what stays of a state (m, 3) when nothing damps it and it is shaken a little, as trials do."""
+    for turn in range(_SHAKES):
+        n, rng = len(at_rest), np.random.default_rng(turn)
+        shaken = at_rest + rng.normal(0.0, _JITTER * vessel.spacing_m, at_rest.shape)
+        at_rest = _calmed(vessel, shaken, SETTLE_S, 0.0)
+        if len(at_rest) == n:
+            break
+    return at_rest
+
+
+def _calmed(vessel: Vessel, start: np.ndarray, seconds: float, damping: float) -> np.ndarray:
+    """Return what stays of particles (m, 3) that start without speed."""
+    p, dt = particles(len(start), vessel.walls), time_step_s(vessel)
+    p.x[: len(start)], p.count[0] = start, len(start)
+    rest(p, vessel.walls, dt, ITERATIONS, int(seconds / dt), damping)
+    return p.x[: p.count[0]].astype(float)
+
+
+def _set_down(p: Particles, vessel: Vessel, place: int) -> None:
+    """Add a particle on the liquid, at a place of the golden spiral over the inner part of the opening."""
+    opening, s, n = vessel.cavity.opening_m, vessel.spacing_m, p.count[0]
+    azimuth, share = place * np.pi * (3 - np.sqrt(5)), _INNER * np.sqrt(place * (np.sqrt(5) - 1) / 2 % 1)
+    out = np.array([np.cos(azimuth), np.sin(azimuth)])
+    radius = vessel.cavity.rim_at(opening[0] + out[:1], opening[1] + out[1:])[0][0]
+    x, y = opening[:2] + share * radius * out
+    under = np.hypot(p.x[:n, 0] - x, p.x[:n, 1] - y) < s
+    p.x[n] = x, y, p.x[:n][under, 2].max(initial=vessel.cavity.origin_m[2]) + _ABOVE * s
+    p.v[n], p.impulse[n], p.count[0] = 0.0, 0.0, n + 1
 
 
 def _settled(vessel: Vessel, n: int) -> np.ndarray:
