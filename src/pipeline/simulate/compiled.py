@@ -30,7 +30,7 @@ def _cache_folder() -> str:
     return str(base / f"numba-{digest.hexdigest()[:16]}")
 
 
-numba.config.CACHE_DIR = _cache_folder()
+numba.config.CACHE_DIR = _cache_folder()  # type: ignore[attr-defined]
 
 compiled = njit(cache=True, nogil=True, fastmath=_FAST)
 part = njit(cache=True, nogil=True, fastmath=_FAST, forceinline=True)

@@ -21,7 +21,7 @@ class Particles(NamedTuple):
     x: np.ndarray
     v: np.ndarray
     impulse: np.ndarray
-    count: np.ndarray
+    count: np.ndarray  # type: ignore[assignment]  # tuples have a method of that name
     gone_x: np.ndarray
     gone_v: np.ndarray
     gone_how: np.ndarray
