@@ -1,0 +1,62 @@
+import numpy as np
+import pytest
+
+from pipeline.geometry.cavity import lip_alone, pour_axis
+from pipeline.simulate import liquid, rest
+from pipeline.simulate.liquid import Vessel
+from pipeline.simulate.particles import particles
+
+SEEDS = (1, 2, 3)
+
+
+def taken_before_it_overflows(vessel: Vessel, room: int, seed: int, most: int = 40) -> int:
+    """Return how many particles can be set down one by one, without speed, on a trial's liquid with that free room."""
+    n = rest.particles_for(vessel, vessel.cavity.capacity_m3) - room
+    p, dt = particles(n + most, vessel.walls), rest.time_step_s(vessel)
+    p.x[:n], p.count[0] = liquid.settle(vessel, n, seed), n
+    assert rest.rest(p, vessel.walls, dt, rest.ITERATIONS, int(rest.HOLD_S / dt), rest.SETTLE_DAMPING) == (
+        0,
+        True,
+    )
+    for k in range(most):
+        rest._set_down(p, vessel, 1000 * seed + k)
+        if rest.rest(p, vessel.walls, dt, rest.ITERATIONS, int(0.1 / dt), 0.0)[0]:
+            return k
+    return most
+
+
+# Within half a layer of the brim these hold 3 to 7 particles too many: at rest the top layer is a lattice.
+TOO_MUCH = pytest.mark.xfail(
+    reason="holds up to 7 particles more than its free room within half a layer of the brim"
+)
+CASES = [(name, room) for name in ("cylinder", "thin", "cone", "bowl") for room in (10, 15)]
+NEAR_THE_BRIM = [
+    ("cylinder", 6),
+    ("cone", 6),
+    *(pytest.param(n, 6, marks=TOO_MUCH) for n in ("thin", "bowl")),
+]
+
+
+@pytest.mark.parametrize(("name", "room"), [*CASES, *NEAR_THE_BRIM])
+def test_filled_gently_it_overflows_when_its_free_room_is_taken(
+    request: pytest.FixtureRequest, name: str, room: int
+) -> None:
+    vessel = request.getfixturevalue(name)
+    taken = np.mean([taken_before_it_overflows(vessel, room, seed) for seed in SEEDS])
+    assert taken == pytest.approx(room, abs=3)
+
+
+@pytest.mark.parametrize(("room", "least", "most"), [pytest.param(0, 5, 30, marks=TOO_MUCH), (40, 0, 0)])
+def test_what_falls_from_a_cups_height_splashes_over_near_the_brim_alone(
+    cylinder: Vessel, bowl: Vessel, room: int, least: int, most: int
+) -> None:
+    """Ten particles, a tilt to 120° in 1.0 s, the lip 30 mm above the opening: they arrive at about 1.2 m/s in 0.1 s."""
+    lip = lip_alone(cylinder.cavity)
+    T_world_held = np.eye(4)
+    T_world_held[:3, 3] = bowl.cavity.opening_m + [-0.04, 0.0, 0.03] - lip
+    axis = pour_axis(cylinder.cavity.opening_m, lip)
+    n = min(rest.particles_for(bowl, bowl.cavity.capacity_m3) - room, liquid.holds(bowl))
+    found = liquid.fill(cylinder, bowl, T_world_held, np.eye(4), lip, axis, np.radians(120.0), 10, n, 1)
+    assert not found.spilled_while_settling
+    assert found.n_leaked == 0
+    assert least <= found.n_spilled <= most
