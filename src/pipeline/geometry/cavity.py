@@ -13,7 +13,7 @@ from pipeline.geometry.frames import apply, rotation_about
 from pipeline.geometry.surface import Surface, subdivided
 
 AZIMUTHS = 256
-TIE_M = 0.002  # rims that are level to within this count as level (DESIGN: the lip of a cup alone)
+TIE_M = 0.002  # rims that are level to within this count as level
 _RIM_STEP_M = 0.0001
 _RIM_GAP_M = 0.004  # a hole in the scan below the rim's edge may be this high
 _LEAST_M3 = 5e-6  # a container that keeps less than 5 ml is none
