@@ -13,6 +13,7 @@ from pipeline.simulate import __main__ as trials_command
 from pipeline.simulate import convergence, measures, physics
 from pipeline.simulate.liquid import Vessel
 from pipeline.simulate.references import THIN_M, references
+from pipeline.simulate.walls import LOWERED
 
 REFERENCES = {reference.name: reference for reference in references()}
 TRUE_M3 = {
@@ -57,7 +58,7 @@ def test_rest_spill_and_overflow_are_near_hydrostatics(cylinder: Vessel):
     assert abs(spill["measured"] - spill["expected"]) < max(np.radians(3.0), allowed["measured"])
     calibrated, uncalibrated = measures.overflow("cylinder", cylinder)
     assert calibrated["measured"] == pytest.approx(calibrated["expected"], rel=0.05)
-    assert uncalibrated["x"] == 0.5
+    assert uncalibrated["x"] == LOWERED
 
 
 def test_a_push_dies_out(cylinder: Vessel):
@@ -105,10 +106,10 @@ def test_a_trial_that_runs_again_as_it_was_has_its_label(measured):
 def test_an_object_is_measured_at_three_spacings_and_at_all_tilts(measured):
     capacity = measured[measured.check == "capacity"]
     assert capacity.spacing_m.round(4).tolist() == [0.0196, 0.014, 0.0098]
-    two_particles = 2 * capacity.spacing_m**3  # the coarsest are 21 in all
-    assert (
-        (capacity.measured - capacity.expected).abs() < np.maximum(0.05 * capacity.expected, two_particles)
-    ).all()
+    error_m3 = (capacity.measured - capacity.expected).abs().to_numpy()
+    assert (error_m3[1:] < 0.05 * capacity.expected.iloc[0]).all()
+    # The coarsest particles are 22 in all, seven to a layer: half a layer is what a calibration can do.
+    assert error_m3[0] < 3.5 * 0.0196**3
     kept = measured[measured.check == "retained"].sort_values("x")
     assert (kept.measured.diff().dropna() <= 0).all()
     assert kept.expected.iloc[0] == pytest.approx(np.pi * 0.030**2 * 0.060, rel=0.02)
