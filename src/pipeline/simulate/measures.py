@@ -83,9 +83,9 @@ def _advance(p: Particles, vessel: Vessel, seconds: float) -> None:
 
 
 def overflow(name: str, vessel: Vessel) -> list[Row]:
-    """Return what stays of too much liquid, and the cavity's capacity (m³); x: the rim, lowered by so many spacings.
+    """Return what a brimful vessel holds, and the cavity's capacity (m³); x: the rim, lowered by so many spacings.
 
-    "capacity": with the rim where the calibration puts it; "capacity_uncalibrated": half a spacing lower than it is.
+    "capacity": with the rim where the calibration puts it; "capacity_uncalibrated": lowered by the nominal `LOWERED`.
     """
     uncalibrated = precompute(vessel.cavity, vessel.spacing_m, LOWERED)
     return [
