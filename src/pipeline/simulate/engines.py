@@ -1,4 +1,7 @@
-"""What can simulate a trial's contents: the liquid, or Bullet's spheres. A trial does not know which of them it asks."""
+"""What can simulate a trial's contents: the liquid, or Bullet's spheres, as gel balls or as a fluid.
+
+A trial does not know which of them it asks.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,7 +11,7 @@ import numpy as np
 
 from pipeline.errors import PipelineError
 from pipeline.geometry.cavity import Cavity
-from pipeline.simulate import bullet, liquid
+from pipeline.simulate import bullet, fluid, gel, liquid
 
 
 @dataclass(frozen=True)
@@ -31,7 +34,8 @@ def _liquid(cavity: Cavity, _vertices: np.ndarray, _triangles: np.ndarray, spaci
 
 ENGINES = {
     "liquid": Engine("liquid", _liquid, liquid.particles_for, liquid.pour, liquid.fill),
-    "bullet": Engine("bullet", bullet.prepare, bullet.particles_for, bullet.pour, bullet.fill),
+    "bullet": Engine("bullet", gel.prepare, bullet.particles_for, bullet.pour, bullet.fill),
+    "bullet_fluid": Engine("bullet_fluid", fluid.prepare, bullet.particles_for, bullet.pour, bullet.fill),
 }
 
 
