@@ -2,9 +2,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline.report.physics import compared
-from pipeline.report.physics_numbers import check_numbers, engine_numbers, kappa, spill_errors, trial_numbers
-from pipeline.report.physics_page import draw
+from pipeline.report import engines_page, physics_page
+from pipeline.report.engines import compared, engine_numbers, kappa
+from pipeline.report.physics_numbers import check_numbers, spill_errors, trial_numbers
 from pipeline.report.style import save
 
 
@@ -46,6 +46,7 @@ def trials(labels: list[bool]) -> pd.DataFrame:
             table = {"experiment": experiment, "object": name, "trial": range(n), "seed": range(n)}
             table |= {"poured": labels, "filled": labels, "failed": False, "n_void": 0, "n_leaked": 0}
             table |= {"n_particles": 150, "n_second": 0, "density_error": 0.01, "tilt_rad": 1.0}
+            table |= {"n_left": 30, "fill_m3": 1.5e-4, "second_fill_m3": 1e-4}
             tables.append(pd.DataFrame({**table, "hydrostatic_margin": np.linspace(-0.5, 0.5, n)}))
     return pd.concat(tables, ignore_index=True)
 
@@ -84,13 +85,33 @@ def test_at_half_the_spacing_half_the_error_is_allowed():
 
 def test_engines_are_compared_on_the_same_draws_alone():
     liquid, bullet = trials([True, True, False, False]), trials([True, False, False, False])
-    assert engine_numbers(compared(liquid, bullet))["physics.engines.pouring.kappa"] == pytest.approx(0.5)
+
+    def numbers() -> dict[str, float]:
+        others = {"bullet": bullet}
+        return engine_numbers(compared(liquid, others), others)
+
+    assert numbers()["physics.engines.bullet.pouring.kappa"] == pytest.approx(0.5)
     bullet.loc[bullet["trial"] == 1, "n_void"] = 2
-    numbers = engine_numbers(compared(liquid, bullet))
-    assert numbers["physics.engines.pouring.trials"] == 6
-    assert numbers["physics.engines.pouring.agreement"] == 1.0
+    assert numbers()["physics.engines.bullet.pouring.trials"] == 6
+    assert numbers()["physics.engines.bullet.pouring.run"] == 8
+    assert numbers()["physics.engines.bullet.pouring.agreement"] == 1.0
     bullet.loc[bullet["trial"] == 0, "failed"] = True
-    assert engine_numbers(compared(liquid, bullet))["physics.engines.filling.trials"] == 4
+    assert numbers()["physics.engines.bullet.filling.trials"] == 4
+    assert numbers()["physics.engines.bullet.filling.failed"] == 2
+
+
+def test_disagreements_are_told_by_who_says_yes_and_how_near_the_border_they_are():
+    """The margins of the four trials are -0.5, -1/6, 1/6 and 0.5; the third is put at the border."""
+    liquid, fluid = trials([False, True, True, True]), trials([False, False, False, True])
+    liquid.loc[liquid["trial"] == 2, "hydrostatic_margin"] = 0.05
+    numbers = engine_numbers(compared(liquid, {"bullet_fluid": fluid}), {})
+    head = "physics.engines.bullet_fluid.pouring"
+    assert numbers[f"{head}.liquid_alone_share"] == 0.5
+    assert numbers[f"{head}.other_alone_share"] == 0.0
+    assert numbers[f"{head}.differ_near_share"] == 0.5
+    assert numbers[f"{head}.near_share"] == 0.25
+    assert numbers[f"{head}.kappa_far"] == pytest.approx(0.4)
+    assert numbers[f"{head}.cup.kappa"] == numbers[f"{head}.kappa"]
 
 
 def test_the_audit_counts_every_trial():
@@ -101,11 +122,18 @@ def test_the_audit_counts_every_trial():
     assert numbers["physics.filling.trials"] == 4
 
 
-@pytest.mark.parametrize("n", [0, 4])
-def test_the_page_is_the_same_bytes_for_the_same_rows(tmp_path, n):
+def test_the_pages_are_the_same_bytes_for_the_same_rows(tmp_path):
     rows = trials([True, False, True, True])
-    both = compared(rows, rows.head(4 * n) if n else rows.iloc[:0])
+    both = compared(rows, {"bullet": rows.head(6), "bullet_fluid": rows})
     for name in ("one.pdf", "two.pdf"):
-        save(draw(checks(), rows, both), tmp_path / name)
-    assert (tmp_path / "one.pdf").read_bytes() == (tmp_path / "two.pdf").read_bytes()
-    assert (tmp_path / "one.pdf").read_bytes().startswith(b"%PDF")
+        save([physics_page.draw(checks(), rows), engines_page.draw(both)], tmp_path / name)
+    written = (tmp_path / "one.pdf").read_bytes()
+    assert (tmp_path / "two.pdf").read_bytes() == written
+    assert written.startswith(b"%PDF")
+    assert written.count(b"/Type /Page ") == 2
+
+
+def test_without_other_engines_there_is_nothing_to_compare():
+    rows = trials([True, False])
+    assert compared(rows, {}).empty
+    assert compared(rows, {"bullet": rows.iloc[:0]}).empty

@@ -55,14 +55,22 @@ rule draw_labels:
         " --label-mappings {input.final:q} --output {output.figure:q} > {log:q} 2>&1"
 
 
+# The other engines' tables, by engine.
+OTHER_TRIALS = {
+    engine: expand(
+        [rules.simulate_pouring_other.output.trials, rules.simulate_filling_other.output.trials],
+        object=OBJECTS,
+        engine=engine,
+    )
+    for engine in OTHER_ENGINES
+}
+
+
 rule report_physics:
     input:
         measurements=[rules.physics_references.output[0], *each(rules.physics_object.output[0])],
         trials=[*each(rules.simulate_pouring.output.trials), *each(rules.simulate_filling.output.trials)],
-        others=[
-            *each(rules.simulate_pouring_other.output.trials),
-            *each(rules.simulate_filling_other.output.trials),
-        ],
+        others=[path for paths in OTHER_TRIALS.values() for path in paths],
     output:
         page=f"{REPORTS}/physics.pdf",
         numbers=f"{REPORTS}/physics.json",
@@ -71,7 +79,8 @@ rule report_physics:
     threads: 1
     params:
         options=options("simulate", "engine"),
+        others=" ".join(f"{engine}={path}" for engine, paths in OTHER_TRIALS.items() for path in paths),
         code=code("pipeline.report.physics"),
     shell:
         "python -m pipeline.report.physics --measurements {input.measurements:q} --trials {input.trials:q}"
-        " --other-trials {input.others:q} --page {output.page:q} --numbers {output.numbers:q} {params.options} > {log:q} 2>&1"
+        " --other-trials {params.others} --page {output.page:q} --numbers {output.numbers:q} {params.options} > {log:q} 2>&1"

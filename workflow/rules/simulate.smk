@@ -4,9 +4,13 @@
 # How: Bullet moves the containers and finds collisions, particles are the liquid. Progress goes to the terminal and to the log.
 
 HELD = config["simulate"]["filling"]["held_objects"]
-# The page on physics compares: it has the first trials of each object run by the engine that the others are not run by.
-OTHER_ENGINE = {"liquid": "bullet", "bullet": "liquid"}[config["simulate"]["engine"]]
-OTHER_TRIALS = config["simulate"]["physics"]["engine_trials"]
+# The pages on physics compare: the first trials of each object are run by the engines that the others are not run by.
+ENGINES = ["liquid", "bullet", "bullet_fluid"]
+OTHER_ENGINES = [name for name in ENGINES if name != config["simulate"]["engine"]]
+
+
+wildcard_constraints:
+    engine="|".join(ENGINES),
 
 
 rule simulate_pouring:
@@ -101,28 +105,28 @@ rule physics_object:
 
 use rule simulate_pouring as simulate_pouring_other with:
     output:
-        trials=f"{PROCESSED}/simulate/physics/{{object}}/{OTHER_ENGINE}/pouring.parquet",
+        trials=f"{PROCESSED}/simulate/physics/{{object}}/{{engine}}/pouring.parquet",
     log:
-        f"logs/simulate/physics/{{object}}_{OTHER_ENGINE}_pouring.log",
+        "logs/simulate/physics/{object}_{engine}_pouring.log",
     benchmark:
-        f"benchmarks/simulate/physics/{{object}}_{OTHER_ENGINE}_pouring.tsv"
+        "benchmarks/simulate/physics/{object}_{engine}_pouring.tsv"
     params:
-        shared=options("simulate", "spacing_m", "seed") + f" --engine {OTHER_ENGINE}",
+        shared=options("simulate", "spacing_m", "seed") + " --engine {engine}",
         options=options("simulate.pouring", "fill_min", "fill_max", "tilt_max_deg", "threshold")
-        + f" --trials {OTHER_TRIALS}",
+        + f" --trials {config['simulate']['physics']['engine_pours']}",
         code=code("pipeline.simulate"),
 
 
 use rule simulate_filling as simulate_filling_other with:
     output:
-        trials=f"{PROCESSED}/simulate/physics/{{object}}/{OTHER_ENGINE}/filling.parquet",
+        trials=f"{PROCESSED}/simulate/physics/{{object}}/{{engine}}/filling.parquet",
     log:
-        f"logs/simulate/physics/{{object}}_{OTHER_ENGINE}_filling.log",
+        "logs/simulate/physics/{object}_{engine}_filling.log",
     benchmark:
-        f"benchmarks/simulate/physics/{{object}}_{OTHER_ENGINE}_filling.tsv"
+        "benchmarks/simulate/physics/{object}_{engine}_filling.tsv"
     params:
         held=rules.simulate_filling.params.held,
-        shared=options("simulate", "spacing_m", "seed") + f" --engine {OTHER_ENGINE}",
+        shared=options("simulate", "spacing_m", "seed") + " --engine {engine}",
         options=options(
             "simulate.filling",
             "held_particles",
@@ -132,5 +136,5 @@ use rule simulate_filling as simulate_filling_other with:
             "height_max",
             "free_room_max_particles",
         )
-        + f" --trials {OTHER_TRIALS}",
+        + f" --trials {config['simulate']['physics']['engine_fillings']}",
         code=code("pipeline.simulate"),

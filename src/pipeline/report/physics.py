@@ -1,5 +1,6 @@
-"""Put what was measured of the liquid on one page, reports/physics.pdf, and into numbers, reports/physics.json."""
+"""Put what was measured of the liquid on two pages, reports/physics.pdf, and into numbers, reports/physics.json."""
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,13 +12,17 @@ if TYPE_CHECKING:
 
 
 def main() -> None:
-    """Read measurements and trials; write the page and the numbers."""
+    """Read measurements and trials; write the pages and the numbers."""
     parser = command.parser(__doc__)
     parser.add_argument("--measurements", type=Path, nargs="+", required=True, help="tables of checks")
     parser.add_argument("--trials", type=Path, nargs="+", required=True, help="all trials of an engine")
     parser.add_argument("--engine", default="liquid", help="what ran --trials")
     parser.add_argument(
-        "--other-trials", type=Path, nargs="*", default=[], help="some of them by the other engine"
+        "--other-trials",
+        nargs="*",
+        default=[],
+        metavar="ENGINE=TABLE",
+        help="some of them by the other engines",
     )
     parser.add_argument("--page", type=Path, required=True)
     parser.add_argument("--numbers", type=Path, required=True)
@@ -25,45 +30,31 @@ def main() -> None:
 
     import pandas as pd
 
-    from pipeline.report.physics_numbers import check_numbers, engine_numbers, trial_numbers
-    from pipeline.report.physics_page import draw
+    from pipeline.report import engines_page, physics_page
+    from pipeline.report.engines import compared, engine_numbers
+    from pipeline.report.physics_numbers import check_numbers, trial_numbers
     from pipeline.report.style import save
 
     checks = pd.concat([read_table(path, "physics") for path in options.measurements], ignore_index=True)
     trials = pd.concat([read_table(path, "trials") for path in options.trials], ignore_index=True)
-    others = [trials.iloc[:0], *(read_table(path, "trials") for path in options.other_trials)]
-    others = pd.concat([table for table in others if len(table)] or others, ignore_index=True)
-    first, second = (trials, others) if options.engine == "liquid" else (others, trials)
-    both = compared(first, second)
-    numbers = check_numbers(checks) | trial_numbers(first) | engine_numbers(both)
+    others = tables(map(command.name_and_path, options.other_trials))
+    engines = {options.engine: trials, **others}
+    liquid = engines.pop("liquid", trials.iloc[:0])
+    both = compared(liquid, engines)
+    numbers = check_numbers(checks) | trial_numbers(liquid) | engine_numbers(both, engines)
     write_json(options.numbers, {key: value for key, value in numbers.items() if value == value})
-    save(draw(checks, first, both), options.page)
+    pages = [physics_page.draw(checks, liquid)]
+    save(pages + [engines_page.draw(both)] if len(both) else pages, options.page)
 
 
-def compared(liquid: "pd.DataFrame", bullet: "pd.DataFrame") -> "pd.DataFrame":
-    """Return the trials that both engines ran: label_liquid, label_bullet, tilt and hydrostatic margin.
-
-    The same draw of the same trial: a draw that is void for one engine alone is another trial for the other.
-    """
+def tables(named: "Iterable[tuple[str, Path]]") -> "dict[str, pd.DataFrame]":
+    """Return each engine's trials, read from its tables."""
     import pandas as pd
 
-    keys = ["experiment", "object", "trial", "seed", "n_void"]
-    merged = liquid.merge(bullet, on=keys, suffixes=("_liquid", "_bullet"))
-    merged = merged[~merged["failed_liquid"] & ~merged["failed_bullet"]]
-    pouring = merged["experiment"] == "pouring"
-    labels = {
-        f"label_{engine}": merged[f"poured_{engine}"].where(pouring, merged[f"filled_{engine}"])
-        for engine in ("liquid", "bullet")
-    }
-    margin = merged["hydrostatic_margin_liquid"]
-    return pd.DataFrame(
-        {
-            **{key: merged[key] for key in keys},
-            **labels,
-            "tilt_rad": merged["tilt_rad_liquid"],
-            "margin": margin,
-        }
-    )
+    read: dict[str, list[pd.DataFrame]] = {}
+    for engine, path in named:
+        read.setdefault(engine, []).append(read_table(path, "trials"))
+    return {engine: pd.concat(parts, ignore_index=True) for engine, parts in read.items()}
 
 
 if __name__ == "__main__":

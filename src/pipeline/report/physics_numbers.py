@@ -1,13 +1,14 @@
-"""Numbers about the liquid's physics, as flat names: errors against hydrostatics, audits, agreement of labels."""
+"""Numbers about the liquid's physics, as flat names: errors against hydrostatics, audits."""
 
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pipeline.report.engines import LABELS
+
 if TYPE_CHECKING:
     import pandas as pd
 
-LABELS = {"pouring": "poured", "filling": "filled"}
 THICK = 120  # fills of fewer particles are thin
 
 Metrics = dict[str, float]
@@ -95,28 +96,6 @@ def trial_numbers(trials: "pd.DataFrame") -> Metrics:
             numbers[f"{head}.density_error{kind}_mean"] = float(part["density_error"].mean())
             numbers[f"{head}.density_error{kind}_max"] = float(part["density_error"].max())
     return numbers
-
-
-def engine_numbers(both: "pd.DataFrame") -> Metrics:
-    """Return Cohen's κ and the agreement of the two engines' labels, over all objects and of each."""
-    numbers: Metrics = {}
-    for experiment, rows in both.groupby("experiment"):
-        head = f"physics.engines.{experiment}"
-        numbers[f"{head}.trials"] = len(rows)
-        numbers[f"{head}.agreement"] = float((rows["label_liquid"] == rows["label_bullet"]).mean())
-        numbers[f"{head}.kappa"] = kappa(rows["label_liquid"], rows["label_bullet"])
-        numbers[f"{head}.bullet_alone_share"] = float((rows["label_bullet"] & ~rows["label_liquid"]).mean())
-        numbers[f"{head}.liquid_alone_share"] = float((rows["label_liquid"] & ~rows["label_bullet"]).mean())
-        for name, part in rows.groupby("object"):
-            numbers[f"{head}.{name}.kappa"] = kappa(part["label_liquid"], part["label_bullet"])
-    return numbers
-
-
-def kappa(one: "pd.Series", other: "pd.Series") -> float:
-    """Return Cohen's κ of two raters' yes and no; NaN when chance alone makes them agree."""
-    a, b = one.to_numpy(bool), other.to_numpy(bool)
-    chance = a.mean() * b.mean() + (1.0 - a.mean()) * (1.0 - b.mean())
-    return float(((a == b).mean() - chance) / (1.0 - chance)) if chance < 1.0 else np.nan
 
 
 def _of(checks: "pd.DataFrame", name: str) -> "pd.DataFrame":

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline.report.physics_numbers import THICK, kappa, spill_errors
+from pipeline.report.physics_numbers import THICK, spill_errors
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,8 +19,8 @@ SPACING_STYLES = [("#D55E00", "o"), ("#0072B2", "s"), ("#009E73", "^")]
 EXPERIMENTS = ("pouring", "filling")
 
 
-def draw(checks: "pd.DataFrame", trials: "pd.DataFrame", both: "pd.DataFrame") -> "Figure":
-    """Return the page (A4, portrait) from the table "physics", all trials of the liquid, and those of both engines."""
+def draw(checks: "pd.DataFrame", trials: "pd.DataFrame") -> "Figure":
+    """Return the page (A4, portrait) from the table "physics" and all trials of the liquid."""
     import matplotlib.pyplot as plt
 
     from pipeline.report.style import RC
@@ -30,7 +30,7 @@ def draw(checks: "pd.DataFrame", trials: "pd.DataFrame", both: "pd.DataFrame") -
         {**RC, "font.size": 7, "axes.labelsize": 7, "axes.titlesize": 8, "legend.fontsize": 6}
     ):
         figure = plt.figure(figsize=(8.27, 11.69))
-        grid = figure.add_gridspec(5, 3, left=0.11, right=0.98, top=0.97, bottom=0.05, hspace=0.6, wspace=0.4)
+        grid = figure.add_gridspec(4, 3, left=0.11, right=0.98, top=0.97, bottom=0.05, hspace=0.6, wspace=0.4)
         panels = (rest_density, rest_level, rest_speed, spill)
         for number, panel in enumerate(panels):
             panel(figure.add_subplot(grid[number // 3, number % 3]), checks)
@@ -40,10 +40,6 @@ def draw(checks: "pd.DataFrame", trials: "pd.DataFrame", both: "pd.DataFrame") -
         again(figure.add_subplot(grid[3, 0]), checks)
         again_where(figure.add_subplot(grid[3, 1]), checks, trials)
         audit(figure.add_subplot(grid[3, 2]), checks, trials)
-        if len(both):
-            kappas(figure.add_subplot(grid[4, 0]), both)
-            for number, experiment in enumerate(EXPERIMENTS):
-                engines_where(figure.add_subplot(grid[4, 1 + number]), both, experiment)
     return figure
 
 
@@ -223,48 +219,11 @@ def audit(axis: "Axes", checks: "pd.DataFrame", trials: "pd.DataFrame") -> None:
     table.scale(1.0, 1.8)
 
 
-def kappas(axis: "Axes", both: "pd.DataFrame") -> None:
-    """Cohen's κ of the labels by liquid and by rigid spheres, by object."""
-    names = list(dict.fromkeys(both["object"]))
-    for k, (experiment, colour) in enumerate(zip(EXPERIMENTS, (BLUE, ORANGE), strict=True)):
-        rows = both[both["experiment"] == experiment]
-        if rows.empty:
-            continue
-        total = kappa(rows["label_liquid"], rows["label_bullet"])
-        for number, name in enumerate(names):
-            part = rows[rows["object"] == name]
-            label = f"{experiment} (all: {total:.2f})" if number == 0 else None
-            value = kappa(part["label_liquid"], part["label_bullet"])
-            axis.plot(
-                value, number + 0.3 * (k - 0.5), marker="os"[k], ms=3.5, color=colour, ls="none", label=label
-            )
-    _named(axis, names)
-    axis.set_ylim(top=len(names) + 1.5)
-    axis.set(title="Liquid and gel balls", xlabel="Cohen's κ of the labels", xlim=(-0.05, 1.05))
-    axis.legend(frameon=False, loc="upper center", ncol=2)
-
-
-def engines_where(axis: "Axes", both: "pd.DataFrame", experiment: str) -> None:
-    """Where the engines disagree: by the hydrostatic margin, and who says yes."""
-    rows = both[both["experiment"] == experiment]
-    differ = rows["label_liquid"] != rows["label_bullet"]
-    _margins(axis, rows["margin"], differ, rows["label_bullet"])
-    axis.set(title=f"Where they differ: {experiment}")
-
-
-def _margins(
-    axis: "Axes", margin: "pd.Series", differ: "pd.Series", bullet: "pd.Series | None" = None
-) -> None:
+def _margins(axis: "Axes", margin: "pd.Series", differ: "pd.Series") -> None:
     edges = np.linspace(-1.0, 1.0, 21).tolist()
     inside = margin.clip(-1.0, 1.0)
     axis.hist(inside, edges, color="0.85", label="all")
-    if bullet is None:
-        axis.hist(inside[differ], edges, color=ORANGE, label="label changes")
-    else:
-        parts = [inside[differ & bullet], inside[differ & ~bullet]]
-        axis.hist(
-            parts, edges, stacked=True, color=[ORANGE, BLUE], label=["gel balls say yes", "liquid says yes"]
-        )
+    axis.hist(inside[differ], edges, color=ORANGE, label="label changes")
     axis.axvline(0.0, color=GREY, lw=0.8, ls="--")
     axis.set(xlabel="hydrostatic margin (share)", ylabel="trials")
     axis.legend(frameon=False)

@@ -1,5 +1,6 @@
 """What all figures share: fonts that print, one colour and one word for each feature set."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,9 +33,12 @@ RC: Any = {
 }
 
 
-def save(figure: "Figure", path: Path) -> None:
-    """Write the figure as PDF, the same bytes for the same figure."""
-    with replacing(path) as temporary:
-        figure.savefig(
-            temporary, metadata={"CreationDate": None, "Creator": "warped-pouring", "Producer": None}
-        )
+def save(figure: "Figure | Sequence[Figure]", path: Path) -> None:
+    """Write a figure, or some as pages, as PDF; the same bytes for the same figures."""
+    from matplotlib.backends.backend_pdf import PdfPages
+    from matplotlib.figure import Figure
+
+    about = {"CreationDate": None, "Creator": "warped-pouring", "Producer": None}
+    with replacing(path) as temporary, PdfPages(temporary, metadata=about) as pages:
+        for page in [figure] if isinstance(figure, Figure) else figure:
+            pages.savefig(page)

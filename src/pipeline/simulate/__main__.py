@@ -38,7 +38,7 @@ def _options() -> argparse.Namespace:
             "--trials-table", type=Path, required=True, help="where the trials are written"
         )
         experiment.add_argument(
-            "--engine", default="liquid", help="what is poured: liquid, or bullet's spheres"
+            "--engine", default="liquid", help="what is poured: liquid, bullet or bullet_fluid"
         )
         experiment.add_argument("--spacing-m", type=float, default=0.010, help="particle spacing")
         experiment.add_argument("--seed", type=int, default=4, help="of the whole experiment")
