@@ -127,3 +127,24 @@ def test_places_are_told_by_the_rim_and_the_wall(pot):
     assert where.over.tolist() == [False, True, False, True, False]
     assert where.through.tolist() == [False, False, True, False, True]
     assert where.under.tolist() == [True, False, True, False, True]
+
+
+def test_nothing_goes_through_a_wall_of_one_and_a_half_millimetres():
+    mesh = lathe(0.030, 0.060, wall=0.0015)
+    thin = fluid.prepare(cavity(*mesh, name="thin"), *mesh, SPACING_M)
+    lip = lip_alone(thin.cavity)
+    axis, rng = pour_axis(thin.cavity.opening_m, lip), np.random.default_rng(5)
+    for seed in range(6):
+        n = bullet.particles_for(thin, rng.uniform(0.05, 1.0) * thin.cavity.capacity_m3)
+        result = bullet.pour(thin, n, lip, axis, rng.uniform(0.0, 2.1), seed)
+        assert not result.failed
+        assert result.n_leaked == 0
+        assert result.n_left + result.n_retained == n
+
+
+def test_a_brimful_cup_keeps_its_capacity(pot):
+    """What runs over while it settles and stands is less than half a layer."""
+    n = bullet.particles_for(pot, pot.cavity.capacity_m3)
+    result = bullet.pour(pot, n, lip_alone(pot.cavity), np.array([0.0, 1.0, 0.0]), 0.0, 1, wait_s=0.0)
+    assert result.n_leaked == 0
+    assert result.n_left < 0.5 * np.pi * RADIUS_M**2 / SPACING_M**2
