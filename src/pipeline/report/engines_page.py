@@ -97,7 +97,8 @@ def margins(axis: "Axes", rows: "pd.DataFrame", word: str) -> None:
     )
     axis.axvline(0.0, color=GREY, lw=0.8, ls="--")
     axis.set(xlabel="hydrostatic margin (share)", ylabel="trials")
-    axis.legend(frameon=False, loc="upper left")
+    axis.set_ylim(top=1.35 * axis.get_ylim()[1])
+    axis.legend(frameon=False, loc="upper center", ncol=3)
 
 
 def _alone(rows: "pd.DataFrame", word: str) -> "list[tuple[pd.Series, str, str, str]]":

@@ -120,7 +120,7 @@ def _catch(world: World, pot: Pot, flights: list[Flight]) -> tuple[int, bool]:
         landed |= where.under & ~where.beyond
         # A rim's crest divides: what comes down on its outer side never was inside.
         outside = np.where(landed, where.beyond & where.above, where.beyond & where.under)
-        through = where.in_wall & landed & ~outside
+        through = where.through & landed & ~outside
         leaked += int(through.sum())
         if outside.any() or through.any():
             world.remove(outside | through)

@@ -14,25 +14,20 @@ _THROWN = 3.0  # spacings above the rim's highest point: nothing comes back from
 
 
 class Places(NamedTuple):
-    """Of n spheres. beyond: further out than the rim's contour; above: no lower than the rim there; under: lower than
-    it; thrown: far above; in_wall: beyond the inner surface, below the rim. All (n,) of bool.
+    """Of n spheres, (n,) of bool. beyond: further out than the rim's contour; above: high enough to pass over the rim there;
+    under: lower than it; thrown: far above; through: too low to pass over it, and beyond the inner surface.
     """
 
     beyond: np.ndarray
     above: np.ndarray
     under: np.ndarray
     thrown: np.ndarray
-    in_wall: np.ndarray
+    through: np.ndarray
 
     @property
     def over(self) -> np.ndarray:
         """Those that have left over the rim; looked at after each step, for outside they fall."""
         return (self.beyond & self.above) | self.thrown
-
-    @property
-    def through(self) -> np.ndarray:
-        """Those that have left otherwise."""
-        return self.in_wall & ~self.over
 
 
 def places(pot: Pot, x: np.ndarray) -> Places:
@@ -44,13 +39,13 @@ def places(pot: Pot, x: np.ndarray) -> Places:
         distance, height, radius, out,
     )  # fmt: skip
     z, r = x[:, 2], pot.radius_m
-    under = z < height
+    above = z >= height - float(w.lowered) - _BELOW_EDGE * r
     return Places(
         out > radius,
-        z >= height - float(w.lowered) - _BELOW_EDGE * r,
-        under,
+        above,
+        z < height,
         z > pot.cavity.rim_m[:, 2].max() + _THROWN * pot.spacing_m,
-        under & (distance < -_IN_WALL * r),
+        ~above & (distance < -_IN_WALL * r),
     )
 
 
