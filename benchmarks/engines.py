@@ -24,10 +24,6 @@ FILLS = (0.3, 0.5, 0.7)  # of the capacity, for the tilt at which the first part
 BEYOND_RAD = np.radians(50.0)
 
 
-def _liquid(room: Cavity, _vertices: np.ndarray, _triangles: np.ndarray, spacing_m: float) -> liquid.Vessel:
-    return liquid.vessel(room, spacing_m)
-
-
 def _gel(friction: float, restitution: float = gel.RESTITUTION) -> Callable:
     return partial(gel.prepare, matter=replace(gel.GEL, friction=friction, restitution=restitution))
 

@@ -104,6 +104,16 @@ def test_a_thrown_sphere_lands_where_ballistics_says(cup, bowl):
             assert len(world) == caught
 
 
+def test_the_floor_stops_what_falls_from_a_third_of_a_metre(bowl):
+    """However far above the floor the last step before the impact ends."""
+    pot, rim_m = bowl.vessel, bowl.cavity.rim_m[:, 2].max()
+    for start_m in np.linspace(0.0, 0.011, 8):
+        with spheres.World(pot) as world:
+            fall = (0.0, np.array([0.01, 0.0, rim_m + start_m]), np.array([0.0, 0.0, -2.4]))
+            assert bullet._catch(world, pot, [fall]) == (0, True)
+            assert len(world) == 1
+
+
 def test_a_blow_up_is_recorded_as_failed(cup):
     lip = lip_alone(cup.cavity)
     result = bullet.pour(cup.vessel, 10, lip, np.array([0.0, 1.0, 0.0]), 400.0, 1)
