@@ -28,19 +28,13 @@ def _gel(friction: float, restitution: float = gel.RESTITUTION) -> Callable:
     return partial(gel.prepare, matter=replace(gel.GEL, friction=friction, restitution=restitution))
 
 
-def _fluid_without_lowered_rim(room: Cavity, vertices_m: np.ndarray, triangles: np.ndarray, spacing_m: float):
-    ready = fluid.prepare(room, vertices_m, triangles, spacing_m)
-    whole_m, faces = gel.decimated(vertices_m, triangles)
-    return replace(ready, vertices_m=whole_m, triangles=faces, settled={})
-
-
 VARIANTS: dict[str, Callable] = {
     "gel, friction 0": _gel(0.0),
     "gel, friction 0.1": _gel(gel.FRICTION),
     "gel, friction 0.4": _gel(0.4),
     "gel, friction 0.1, no rebound": _gel(gel.FRICTION, 0.0),
     "fluid": fluid.prepare,
-    "fluid, rim not lowered": _fluid_without_lowered_rim,
+    "fluid, rim lowered by 0.45": partial(fluid.prepare, by=0.45),
 }
 
 

@@ -1,9 +1,8 @@
 """Bullet's fluid mode: spheres that touch the container alone, without friction, moved by SPH forces between them.
 
 A sphere is half a spacing in radius, so that its centre keeps from the wall what it keeps from a free surface. One that
-flows over the rim stands a whole layer higher than liquid would; so Bullet's wall ends below the scanned rim. By how
-much is chosen for each container, as for the liquid (`walls`): what a container keeps that is filled beyond its brim is
-its capacity, as near as layers allow.
+flows over the rim stands a whole layer higher than liquid would; so Bullet's wall ends below the scanned rim, by as much
+as the liquid's before its calibration (`walls`).
 """
 
 from functools import partial
@@ -14,38 +13,20 @@ from pipeline.geometry.cavity import Cavity
 from pipeline.simulate.containers import decimated
 from pipeline.simulate.fields import precompute
 from pipeline.simulate.forces import response
-from pipeline.simulate.packing import settled
 from pipeline.simulate.spheres import Matter, Pot
 
 STEP_PER_SPACING = 0.3  # s/m: 3 ms at 10 mm; at 6 ms the fluid no longer comes to rest
 RADIUS = 0.5  # spacings
-LOWERED = 0.75  # spacings; where the calibration starts
-TOLERANCE = 0.01  # of the capacity
+# Spacings. Chosen for each container by overflow, down to 0.45 in small cups, it would keep them brimful, and hold back at the lip.
+LOWERED = 0.75
 CALMING = 5.0  # 1/s
-_OVERFILL = 1.1
-_RANGE = (0.25, 1.0)
-_TRIALS = 3
 _LEAST_M2 = 1e-12
 
 
-def prepare(cavity: Cavity, vertices_m: np.ndarray, triangles: np.ndarray, spacing_m: float) -> Pot:
-    """Return a container for fluid of which a sphere is spacing_m³, calibrated by overflow."""
-    area_m2 = np.pi * np.hypot(*(cavity.rim_m - cavity.opening_m)[:, :2].T).mean() ** 2
-    target = round(cavity.capacity_m3 / spacing_m**3)
-    tried: list[tuple[int, Pot]] = []
-    by = LOWERED
-    for _ in range(_TRIALS):
-        candidate = pot(cavity, vertices_m, triangles, spacing_m, by)
-        excess = len(settled(candidate, round(_OVERFILL * target))[0]) - target
-        tried.append((abs(excess), candidate))
-        if abs(excess) <= TOLERANCE * target:
-            break
-        by = float(np.clip(by + excess * spacing_m**2 / area_m2, *_RANGE))
-    return min(tried, key=lambda pair: pair[0])[1]
-
-
-def pot(cavity: Cavity, vertices_m: np.ndarray, triangles: np.ndarray, spacing_m: float, by: float) -> Pot:
-    """Return a container whose wall ends `by` spacings below the rim."""
+def prepare(
+    cavity: Cavity, vertices_m: np.ndarray, triangles: np.ndarray, spacing_m: float, by: float = LOWERED
+) -> Pot:
+    """Return a container for fluid of which a sphere is spacing_m³, its wall ending `by` spacings below the rim."""
     walls = precompute(cavity, spacing_m, by).walls
     matter = Matter(
         step_s=STEP_PER_SPACING * spacing_m,
