@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline import artefacts
-from pipeline.geometry.cavity import Cavity, lip_alone, pour_axis, retained_volume_m3
+from pipeline.geometry.cavity import lip_alone, pour_axis, retained_volume_m3
 from pipeline.report.engines import NEAR, kappa
 from pipeline.simulate import bullet, draws, engines, fluid, gel, liquid, trials
 
