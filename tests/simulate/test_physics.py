@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pandas as pd
 import pytest
-from simulate.test_trials import lathe
+from simulate.test_trials import lathe, prepare
 
 from pipeline import artefacts
 from pipeline.geometry.cavity import lip_alone, pour_axis
@@ -71,17 +71,14 @@ def test_a_push_dies_out(cylinder: Vessel):
 def measured(tmp_path_factory) -> pd.DataFrame:
     """What the command line measures in an object, and its trials."""
     folder = tmp_path_factory.mktemp("physics")
-    cup = str(folder / "cup.ply")
-    artefacts.write_mesh(cup, lathe(0.030, 0.060))
-    mesh = ["--object", "cup", "--mesh", cup]
-    held = ["--held", f"cup={cup}"]
+    container, cup = prepare("cup", lathe(0.030, 0.060), folder, 0.014), str(folder / "cup.ply")
+    mesh, held = ["--object", "cup", "--mesh", cup], ["--held", f"cup={cup}"]
+    ready, above = ["--object", "cup", "--container", container], ["--held", f"cup={container}"]
     pouring, filling, output = (str(folder / f"{name}.parquet") for name in ("pouring", "filling", "physics"))
     with pytest.MonkeyPatch.context() as patch:
-        for options in (["pouring", *mesh], ["filling", *mesh, *held]):
+        for options in (["pouring", *ready], ["filling", *ready, *above]):
             table = ["--trials-table", pouring if options[0] == "pouring" else filling]
-            patch.setattr(
-                sys, "argv", ["simulate", *options, *table, "--trials", "6", "--spacing-m", "0.014"]
-            )
+            patch.setattr(sys, "argv", ["simulate", *options, *table, "--trials", "6"])
             trials_command.main()
         words = [*mesh, *held, "--pouring", pouring, "--filling", filling, "--spacing-m", "0.014"]
         patch.setattr(

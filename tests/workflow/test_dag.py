@@ -18,12 +18,21 @@ def _each(rule: str, objects=frozenset(OBJECTS)) -> set[str]:
 
 
 SIMULATED = _each("simulate_pouring") | _each("simulate_filling") | CLASSIFIED
+CONTAINED = _each("simulate_container") | SIMULATED
 WARPED = _each("warp") | _each("parametrise") | ASSEMBLED | CLASSIFIED | {"draw_labels"}
 
 
 def _of_one(name: str) -> set[str]:
     """Return all that follows from the scan of an object that is neither source nor held."""
-    stages = ("fuse", "label", "warp", "parametrise", "simulate_pouring", "simulate_filling")
+    stages = (
+        "fuse",
+        "label",
+        "warp",
+        "parametrise",
+        "simulate_container",
+        "simulate_pouring",
+        "simulate_filling",
+    )
     return {f"{stage} {name}" for stage in stages} | ASSEMBLED | CLASSIFIED | {"draw_labels"}
 
 
@@ -73,12 +82,13 @@ def test_one_core_gives_the_same_bytes_as_two(finished, unfinished):
 @pytest.mark.parametrize(
     ("key", "value", "jobs"),
     [
-        ("scan.noise", 0.5, _each("scan") | _each("fuse") | _each("label") | WARPED | SIMULATED),
-        ("fuse.points", 7000, _each("fuse") | _each("label") | WARPED | SIMULATED),
+        ("scan.noise", 0.5, _each("scan") | _each("fuse") | _each("label") | WARPED | CONTAINED),
+        ("fuse.points", 7000, _each("fuse") | _each("label") | WARPED | CONTAINED),
         ("label.ridge", 2.0, _each("label") | WARPED),
         ("warp.k", 2, WARPED),
         ("parametrise.hull_points", 3000, _each("parametrise") | ASSEMBLED | CLASSIFIED),
         ("simulate.seed", 40, SIMULATED),
+        ("simulate.spacing_m", 0.015, CONTAINED),
         ("simulate.engine", "bullet", SIMULATED),
         ("simulate.physics.convergence_trials", 3, set()),
         ("simulate.pouring.tilt_max_deg", 90.0, _each("simulate_pouring") | {"classify pouring", "report"}),
@@ -118,9 +128,10 @@ def test_two_keys_that_swap_their_values_are_a_change(project):
 @pytest.mark.parametrize(
     ("module", "jobs"),
     [
-        ("scan/camera.py", _each("scan") | _each("fuse") | _each("label") | WARPED | SIMULATED),
+        ("scan/camera.py", _each("scan") | _each("fuse") | _each("label") | WARPED | CONTAINED),
         ("label/features.py", _each("label") | WARPED),
         ("simulate/trials.py", SIMULATED),
+        ("simulate/fields.py", CONTAINED),
         ("classify/regression.py", CLASSIFIED),
         ("report/roc.py", {"report"}),
         ("track/store.py", set()),

@@ -4,6 +4,8 @@ Settled states are made once a level (levels 10 % apart) and shared: a trial tak
 particles, takes away those at the top and lets the rest settle for a moment (`HOLD_S`) before it moves.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from pipeline.simulate.compiled import compiled
@@ -47,14 +49,28 @@ def settle(vessel: Vessel, n: int, seed: int | tuple[int, ...]) -> np.ndarray:
 
     Fewer come back when the vessel does not hold as many: what is missing ran over.
     """
-    level = 8
-    while level < n:
-        level = int(np.ceil(level * _LEVELS))
+    level = next(level for level in _levels() if level >= n)
     at_rest = _brimful(vessel) if level > holds(vessel) else _settled(vessel, level)
     if len(at_rest) < n:  # a level just below the rim can splash over it while it settles
         at_rest = _brimful(vessel) if n <= holds(vessel) else _topped(vessel)
     lowest = _lowest(at_rest, n)
     return lowest + np.random.default_rng(seed).normal(0.0, _JITTER * vessel.spacing_m, lowest.shape)
+
+
+def settle_all(vessel: Vessel) -> None:
+    """Make every settled state that `settle` may ask for."""
+    for level in _levels():
+        if level > holds(vessel):
+            break
+        _settled(vessel, level)
+    _topped(vessel)
+
+
+def _levels() -> Iterator[int]:
+    level = 8
+    while True:
+        yield level
+        level = int(np.ceil(level * _LEVELS))
 
 
 def holds(vessel: Vessel) -> int:

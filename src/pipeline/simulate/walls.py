@@ -15,7 +15,7 @@ from pipeline.simulate.rest import overflows_at, particles_for
 __all__ = ["Vessel", "vessel"]
 
 LOWERED = 0.75  # spacings: a particle's centre stays that far above what it flows over
-TOLERANCE = 0.0025
+TOLERANCE = 0.005
 _RANGE = (0.25, 1.25)
 _TRIALS = 5
 
