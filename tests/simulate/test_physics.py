@@ -11,6 +11,7 @@ from pipeline import artefacts
 from pipeline.geometry.cavity import lip_alone, pour_axis
 from pipeline.simulate import __main__ as trials_command
 from pipeline.simulate import convergence, measures, physics
+from pipeline.simulate.fields import precompute
 from pipeline.simulate.liquid import Vessel
 from pipeline.simulate.references import THIN_M, references
 from pipeline.simulate.walls import LOWERED
@@ -59,6 +60,18 @@ def test_rest_spill_and_overflow_are_near_hydrostatics(cylinder: Vessel):
     calibrated, uncalibrated = measures.overflow("cylinder", cylinder)
     assert calibrated["measured"] == pytest.approx(calibrated["expected"], rel=0.05)
     assert uncalibrated["x"] == LOWERED
+
+
+@pytest.mark.parametrize("name", ["cylinder", "cone"])
+def test_pouring_begins_where_hydrostatics_says_and_nearer_at_half_the_spacing(request, name):
+    """Within 3° or one spacing held back at the lip at 10 mm, within half of that at 5 mm; the threshold is 1 ml at both."""
+    vessel = request.getfixturevalue(name)
+    fine = precompute(vessel.cavity, vessel.spacing_m / 2, vessel.lowered)
+    for share in physics.FILLS:
+        (spill, allowed), (finer, _) = (measures.spill_angle(name, v, share, 4) for v in (vessel, fine))
+        bar = max(np.radians(3.0), allowed["measured"])
+        assert abs(spill["measured"] - spill["expected"]) < bar
+        assert abs(finer["measured"] - finer["expected"]) < bar / 2
 
 
 def test_a_push_dies_out(cylinder: Vessel):
