@@ -19,7 +19,8 @@ def _each(rule: str, objects=frozenset(OBJECTS)) -> set[str]:
 
 SIMULATED = _each("simulate_pouring") | _each("simulate_filling") | CLASSIFIED
 CONTAINED = _each("simulate_container") | SIMULATED
-WARPED = _each("warp") | _each("parametrise") | ASSEMBLED | CLASSIFIED | {"draw_labels"}
+COMPARED = _each("accuracy")
+WARPED = _each("warp") | _each("parametrise") | ASSEMBLED | COMPARED | CLASSIFIED | {"draw_labels"}
 
 
 def _of_one(name: str) -> set[str]:
@@ -86,7 +87,7 @@ def test_one_core_gives_the_same_bytes_as_two(finished, unfinished):
         ("fuse.points", 7000, _each("fuse") | _each("label") | WARPED | CONTAINED),
         ("label.ridge", 2.0, _each("label") | WARPED),
         ("warp.k", 2, WARPED),
-        ("parametrise.hull_points", 3000, _each("parametrise") | ASSEMBLED | CLASSIFIED),
+        ("parametrise.hull_points", 3000, _each("parametrise") | ASSEMBLED | CLASSIFIED | COMPARED),
         ("simulate.seed", 40, SIMULATED),
         ("simulate.spacing_m", 0.015, CONTAINED),
         ("simulate.engine", "bullet", SIMULATED),
@@ -155,12 +156,12 @@ def test_comments_and_touched_files_rerun_nothing(project):
 def test_a_changed_scan_reruns_its_object_alone(project):
     scan = project / "data/raw/wide_bowl"
     (scan / "frame-000000.depth.png").write_bytes((scan / "frame-000001.depth.png").read_bytes())
-    assert project.planned() == _of_one("wide_bowl")
+    assert project.planned() == _of_one("wide_bowl") | {"accuracy wide_bowl"}
 
 
 def test_a_changed_scan_of_a_held_cup_reruns_every_filling(project):
     _append(project / "data/raw/short_cup/camera-intrinsics.txt", "\n")
-    assert project.planned() == _of_one("short_cup") | _each("simulate_filling")
+    assert project.planned() == _of_one("short_cup") | _each("simulate_filling") | {"accuracy short_cup"}
 
 
 def test_a_changed_annotation_reruns_the_labels(project):
