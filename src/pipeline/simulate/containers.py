@@ -52,8 +52,7 @@ class Containers:
             self._client = -1
 
     def add_second(self, vertices_m: np.ndarray, triangles: np.ndarray) -> int:
-        """Add a static container by its mesh (V, 3), (F, 3) in its object frame; return Bullet's number of the body."""
-        vertices_m, triangles = decimated(vertices_m, triangles)
+        """Add a static container by a coarse mesh (V, 3), (F, 3) in its object frame; return Bullet's number of the body."""
         shape = pybullet.createCollisionShape(
             pybullet.GEOM_MESH,
             vertices=vertices_m.tolist(),
@@ -63,14 +62,14 @@ class Containers:
         )
         return pybullet.createMultiBody(0.0, shape, physicsClientId=self._client)
 
-    def add_held(self, vertices_m: np.ndarray, triangles: np.ndarray, centre_m: np.ndarray) -> int:
-        """Add a container that moves, by its mesh and its opening's centre (object frame); return the body's number."""
+    def add_held(self, pieces: list[np.ndarray]) -> int:
+        """Add a container that moves, by its `wall_pieces`; return the body's number."""
         from scipy.spatial import ConvexHull
 
-        pieces = wall_pieces(vertices_m, triangles, centre_m)
         body = self._compound(pieces)
         self._scout[body] = self._compound(pieces[::_SCOUT_STRIDE])
-        self._hull_m[body] = vertices_m[ConvexHull(vertices_m).vertices]
+        points = np.concatenate(pieces)
+        self._hull_m[body] = points[ConvexHull(points).vertices]
         return body
 
     def _compound(self, pieces: list[np.ndarray]) -> int:

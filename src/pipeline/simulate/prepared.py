@@ -1,6 +1,6 @@
 """A container made ready for trials, once: what every trial with it needs and what costs more than a trial to find out.
 
-Its cavity, its mesh for Bullet, and the liquid's view of it: walls, calibration, states at rest at every level.
+Its cavity, its shape for Bullet, and the liquid's view of it: walls, calibration, states at rest at every level.
 """
 
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.geometry.cavity import Cavity, Quadrature, cavity, quadrature, retained_volume_m3
 from pipeline.simulate import liquid
-from pipeline.simulate.containers import decimated
+from pipeline.simulate.containers import decimated, wall_pieces
 from pipeline.simulate.engines import ENGINES, Engine
 from pipeline.simulate.fields import Walls
 
@@ -21,12 +21,16 @@ Arrays = dict[str, np.ndarray]
 
 @dataclass(frozen=True)
 class Container:
-    """A container ready for trials: its mesh (object frame, metres), fine and coarse, and how an engine sees it."""
+    """A container ready for trials; object frame, metres.
+
+    height_m: extent of the whole mesh along z. coarse: vertices (V, 3) and triangles (F, 3) for Bullet, of a container that
+    stands; pieces: convex ones of its wall, of one that moves. vessel: how an engine sees it.
+    """
 
     name: str
-    vertices_m: np.ndarray
-    triangles: np.ndarray
+    height_m: float
     coarse: tuple[np.ndarray, np.ndarray]
+    pieces: list[np.ndarray]
     vessel: Any
     engine: Engine
     _kept_m3: dict[tuple[bytes, float], float] = field(default_factory=dict, repr=False, compare=False)
@@ -35,11 +39,6 @@ class Container:
     def cavity(self) -> Cavity:
         """The room for liquid, object frame."""
         return self.vessel.cavity
-
-    @property
-    def height_m(self) -> float:
-        """The extent of the whole mesh along z."""
-        return float(np.ptp(self.vertices_m[:, 2]))
 
     @property
     def depth_m(self) -> float:
@@ -74,7 +73,8 @@ def container(
     room = cavity(vertices_m, triangles, name=name)
     coarse = decimated(vertices_m, triangles)
     vessel = engine.prepare(room, *coarse, spacing_m)
-    return Container(name, vertices_m, triangles, coarse, vessel, engine)
+    pieces = wall_pieces(vertices_m, triangles, room.opening_m)
+    return Container(name, float(np.ptp(vertices_m[:, 2])), coarse, pieces, vessel, engine)
 
 
 def to_arrays(ready: Container) -> Arrays:
@@ -83,15 +83,24 @@ def to_arrays(ready: Container) -> Arrays:
     liquid.settle_all(vessel)
     keys = sorted(vessel.settled)
     return {
-        **{"vertices_m": ready.vertices_m.astype(np.float32), "triangles": ready.triangles.astype(np.int32)},
+        "height_m": np.array(ready.height_m),
         **{"coarse_vertices_m": ready.coarse[0], "coarse_triangles": ready.coarse[1]},
         **{"spacing_m": np.array(vessel.spacing_m), "lowered": np.array(vessel.lowered)},
         **{f"cavity_{part.name}": np.asarray(getattr(ready.cavity, part.name)) for part in fields(Cavity)},
         **{f"walls_{name}": np.asarray(value) for name, value in vessel.walls._asdict().items()},
         "settled_keys": np.array(keys, dtype=np.int64),
-        "settled_counts": np.array([len(vessel.settled[key]) for key in keys], dtype=np.int64),
-        "settled_m": np.concatenate([vessel.settled[key] for key in keys]).astype(np.float32),
+        **_joined("settled", [vessel.settled[key].astype(np.float32) for key in keys]),
+        **_joined("pieces", ready.pieces),
     }
+
+
+def _joined(name: str, parts: list[np.ndarray]) -> Arrays:
+    """Return arrays (n, 3) as one, and how long each is."""
+    return {f"{name}_m": np.concatenate(parts), f"{name}_counts": np.array([len(part) for part in parts])}
+
+
+def _parts(name: str, arrays: Mapping[str, np.ndarray]) -> list[np.ndarray]:
+    return np.split(arrays[f"{name}_m"].astype(float), np.cumsum(arrays[f"{name}_counts"])[:-1])
 
 
 def from_arrays(name: str, arrays: Mapping[str, np.ndarray], engine: Engine = ENGINES["liquid"]) -> Container:
@@ -100,13 +109,13 @@ def from_arrays(name: str, arrays: Mapping[str, np.ndarray], engine: Engine = EN
     coarse = arrays["coarse_vertices_m"], arrays["coarse_triangles"]
     spacing_m = float(arrays["spacing_m"])
     vessel = _vessel(room, arrays) if engine.name == "liquid" else engine.prepare(room, *coarse, spacing_m)
-    return Container(name, arrays["vertices_m"].astype(float), arrays["triangles"], coarse, vessel, engine)
+    pieces = _parts("pieces", arrays)
+    return Container(name, float(arrays["height_m"]), coarse, pieces, vessel, engine)
 
 
 def _vessel(room: Cavity, arrays: Mapping[str, np.ndarray]) -> liquid.Vessel:
     walls = Walls(*(_scalar(arrays[f"walls_{name}"]) for name in Walls._fields))
-    states = np.split(arrays["settled_m"].astype(float), np.cumsum(arrays["settled_counts"])[:-1])
-    settled = dict(zip(arrays["settled_keys"].tolist(), states, strict=True))
+    settled = dict(zip(arrays["settled_keys"].tolist(), _parts("settled", arrays), strict=True))
     return liquid.Vessel(room, float(arrays["spacing_m"]), float(arrays["lowered"]), walls, settled)
 
 

@@ -48,9 +48,7 @@ class FillingExperiment:
         self.second, self.held, self.protocol = second, tuple(held), protocol
         self._bullet = Containers()
         self._second_body = self._bullet.add_second(*second.coarse)
-        self._held_bodies = [
-            self._bullet.add_held(cup.vertices_m, cup.triangles, cup.cavity.opening_m) for cup in self.held
-        ]
+        self._held_bodies = [self._bullet.add_held(cup.pieces) for cup in self.held]
 
     def __enter__(self) -> "FillingExperiment":
         return self
