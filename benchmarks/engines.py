@@ -17,7 +17,7 @@ import pandas as pd
 from pipeline import artefacts
 from pipeline.geometry.cavity import lip_alone, pour_axis, retained_volume_m3
 from pipeline.report.engines import NEAR, kappa
-from pipeline.simulate import bullet, draws, engines, fluid, gel, liquid, trials
+from pipeline.simulate import bullet, draws, engines, fluid, gel, liquid, prepared, trials
 
 PROTOCOL = draws.Pouring(0.05, 1.0, float(np.radians(120.0)), 1)
 FILLS = (0.3, 0.5, 0.7)  # of the capacity, for the tilt at which the first particle leaves
@@ -53,7 +53,7 @@ def onset_deg(engine, vessel) -> float:
     return float(np.degrees(np.mean(late)))
 
 
-def pours(cup: trials.Container, n: int, seed: int) -> pd.DataFrame:
+def pours(cup: prepared.Container, n: int, seed: int) -> pd.DataFrame:
     """Return the first n pouring trials of a container."""
     return pd.DataFrame([trials.pouring_trial(cup, PROTOCOL, number, seed) for number in range(n)])
 
@@ -79,13 +79,13 @@ def measure(
 ) -> dict[str, dict[str, float]]:
     """Return the numbers of each variant, over all named objects."""
     scans = {name: artefacts.read_mesh(meshes / name / "mesh.ply") for name in names}
-    cups = {name: trials.container(name, *scan, spacing_m) for name, scan in scans.items()}
+    cups = {name: prepared.container(name, *scan, spacing_m) for name, scan in scans.items()}
     truth = pd.concat([pours(cup, n, seed) for cup in cups.values()], ignore_index=True)
     late = float(np.mean([onset_deg(liquid, cup.vessel) for cup in cups.values()]))
     found: dict[str, dict[str, float]] = {"liquid": {"onset_deg": late}}
     for variant, prepare in VARIANTS.items():
         own = replace(engines.ENGINES["bullet"], name=variant, prepare=prepare)
-        pots = [trials.container(name, *scans[name], spacing_m, own) for name in names]
+        pots = [prepared.container(name, *scans[name], spacing_m, own) for name in names]
         rows = pd.concat([pours(cup, n, seed) for cup in pots], ignore_index=True)
         late = float(np.mean([onset_deg(bullet, cup.vessel) for cup in pots]))
         found[variant] = {**compared(truth, rows), "onset_deg": late}

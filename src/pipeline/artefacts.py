@@ -1,8 +1,9 @@
-"""The only reader and writer of the project's tables, meshes and JSON files: one schema a table, atomic writes."""
+"""The only reader and writer of the project's tables, meshes, arrays and JSON files: one schema a table, atomic writes."""
 
 import json
 import os
-from collections.abc import Iterator
+import zipfile
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -100,6 +101,21 @@ def read_mesh(path: str | Path) -> Mesh:
     except (OSError, ValueError) as error:
         raise PipelineError(f"{path}: expected a mesh, but it cannot be read: {error}") from error
     return np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64)
+
+
+def write_arrays(path: str | Path, arrays: Mapping[str, np.ndarray]) -> None:
+    """Write named arrays as NPZ; equal arrays are equal bytes."""
+    with replacing(path) as temporary:
+        np.savez_compressed(temporary, allow_pickle=False, **arrays)
+
+
+def read_arrays(path: str | Path) -> dict[str, np.ndarray]:
+    """Read arrays written by `write_arrays`."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return dict(file)
+    except (OSError, ValueError, zipfile.BadZipFile) as error:
+        raise PipelineError(f"{path}: expected arrays (NPZ), but it cannot be read: {error}") from error
 
 
 def points(frame: pd.DataFrame) -> np.ndarray:

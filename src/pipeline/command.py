@@ -46,10 +46,10 @@ def progress(items: Iterable[T], total: int, what: str, every_s: float = 5.0) ->
 
 
 def name_and_path(text: str) -> tuple[str, Path]:
-    """Return both halves of an option such as --held NAME=MESH."""
+    """Return both halves of an option such as --held NAME=FILE."""
     name, equals, path = text.partition("=")
     if not (name and equals and path):
         raise PipelineError(
-            f"--held {text}: expected NAME=MESH, such as mug=data/processed/fuse/mug/mesh.ply"
+            f"--held {text}: expected NAME=FILE, such as mug=data/processed/simulate/containers/mug.npz"
         )
     return name, Path(path)

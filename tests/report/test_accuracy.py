@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from pipeline.report.accuracy import errors
 from pipeline.report.metrics import accuracy_metrics, warp_metrics
 
 ROOT = Path(__file__).parents[2]
@@ -27,7 +28,8 @@ def metrics(tmp_path_factory) -> dict[str, float]:
     told = subprocess.run(call, cwd=folder, capture_output=True, text=True)
     assert told.returncode == 0, told.stderr
     processed = folder / "data/processed"
-    return accuracy_metrics(processed, "mug", NAMES) | warp_metrics(processed, "mug", NAMES)
+    found = {name: errors(processed, "mug", name) for name in NAMES}
+    return accuracy_metrics(found) | warp_metrics(processed, "mug", NAMES)
 
 
 def test_fused_surfaces_are_near_the_true_ones_on_both_sides_of_the_wall(metrics):

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import trimesh
-from simulate.test_trials import INNER_M, lathe
+from simulate.test_trials import INNER_M, lathe, prepare
 
 from pipeline import artefacts, command
 from pipeline.classify import __main__ as classify
@@ -34,11 +34,11 @@ def holed() -> trimesh.Trimesh:
     [("plate", box(0.2, 0.2, 0.004)), ("block", box(0.06, 0.06, 0.06)), ("sieve", holed())],
     ids=["plate", "block", "sieve"],
 )
-@pytest.mark.parametrize("engine", ["liquid", "bullet"])
-def test_what_holds_no_liquid_is_one_sentence_and_no_trial(tmp_path, monkeypatch, capsys, name, mesh, engine):
-    path, output = str(tmp_path / f"{name}.ply"), tmp_path / "trials.parquet"
+def test_what_holds_no_liquid_is_one_sentence_and_no_container(tmp_path, monkeypatch, capsys, name, mesh):
+    """And so no trial, whatever the engine: they all start from the container."""
+    path, output = str(tmp_path / f"{name}.ply"), tmp_path / "container.npz"
     artefacts.write_mesh(path, (np.array(mesh.vertices), np.array(mesh.faces)))
-    words = ["pouring", "--object", name, "--mesh", path, "--trials-table", str(output), "--engine", engine]
+    words = ["prepare", "--object", name, "--mesh", path, "--container", str(output)]
     monkeypatch.setattr(sys, "argv", ["simulate", *words])
     with pytest.raises(SystemExit) as stopped:
         command.run(simulate.main)
@@ -53,8 +53,8 @@ def test_what_holds_no_liquid_is_one_sentence_and_no_trial(tmp_path, monkeypatch
 def violent(tmp_path_factory):
     """The path of trials in which the cup turns up to 12 times in a second."""
     folder = tmp_path_factory.mktemp("violent")
-    artefacts.write_mesh(folder / "cup.ply", lathe(INNER_M, 0.060))
-    words = ["pouring", "--object", "cup", "--mesh", str(folder / "cup.ply"), "--trials", "60"]
+    cup = prepare("cup", lathe(INNER_M, 0.060), folder)
+    words = ["pouring", "--object", "cup", "--container", cup, "--trials", "60"]
     ranges = ["--tilt-max-deg", str(360 * TURNS), "--fill-min", "0.02", "--threshold", "40"]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "argv", ["simulate", *words, *ranges, "--trials-table", str(folder / "t.parquet")])

@@ -4,13 +4,13 @@ import sys
 
 import numpy as np
 import pytest
-from simulate.test_trials import FILLING, HALF_FULL, lathe
+from simulate.test_trials import FILLING, HALF_FULL, lathe, prepare
 
 from pipeline import artefacts
 from pipeline.errors import PipelineError
 from pipeline.geometry.cavity import lip_alone, pour_axis
 from pipeline.simulate import __main__ as command_line
-from pipeline.simulate import bullet, engines, gel, packing, spheres, trials
+from pipeline.simulate import bullet, engines, gel, packing, prepared, spheres, trials
 
 SPACING_M = 0.012
 N = 50
@@ -19,12 +19,12 @@ ENGINES = ("bullet", "bullet_fluid")
 
 @pytest.fixture(scope="module", params=ENGINES)
 def cup(request):
-    return trials.container("cup", *lathe(0.030, 0.060), SPACING_M, engines.engine(request.param))
+    return prepared.container("cup", *lathe(0.030, 0.060), SPACING_M, engines.engine(request.param))
 
 
 @pytest.fixture(scope="module")
 def bowl(cup):
-    return trials.container("bowl", *lathe(0.045, 0.040), SPACING_M, cup.engine)
+    return prepared.container("bowl", *lathe(0.045, 0.040), SPACING_M, cup.engine)
 
 
 def pour(cup, n, tilt_deg, seed=1, **options):
@@ -73,7 +73,7 @@ def test_the_turning_frame_throws_a_sphere_as_the_world_does(cup):
 
 
 def test_the_trials_are_those_of_the_liquid(cup):
-    liquid_cup = trials.container("cup", *lathe(0.030, 0.060), SPACING_M)
+    liquid_cup = prepared.container("cup", *lathe(0.030, 0.060), SPACING_M)
     for number in range(2):
         balls, liquid = (trials.pouring_trial(each, HALF_FULL, number, 4) for each in (cup, liquid_cup))
         for key in ("seed", "fill_m3", "tilt_rad", "lip_x_m", "n_particles", "hydrostatic_margin"):
@@ -134,11 +134,10 @@ def test_a_sphere_that_goes_through_the_wall_is_told_from_one_that_left_over_it(
 
 
 def test_an_engine_is_chosen_by_name(tmp_path, monkeypatch):
-    cup, output = str(tmp_path / "cup.ply"), tmp_path / "trials.parquet"
-    artefacts.write_mesh(cup, lathe(0.030, 0.060))
-    words = ["pouring", "--object", "cup", "--mesh", cup, "--trials-table", str(output), "--trials", "2"]
+    cup, output = prepare("cup", lathe(0.030, 0.060), tmp_path, 0.014), tmp_path / "trials.parquet"
+    words = ["pouring", "--object", "cup", "--container", cup, "--trials-table", str(output), "--trials", "2"]
     for name, dense in (("bullet", False), ("bullet_fluid", True)):
-        monkeypatch.setattr(sys, "argv", ["simulate", *words, "--spacing-m", "0.014", "--engine", name])
+        monkeypatch.setattr(sys, "argv", ["simulate", *words, "--engine", name])
         command_line.main()
         assert (artefacts.read_table(output, "trials").density_error.notna() == dense).all()
     monkeypatch.setattr(sys, "argv", ["simulate", *words, "--engine", "bulet"])

@@ -32,7 +32,7 @@ def at(x=0.0, y=0.0, z=0.0):
 @pytest.fixture(scope="module")
 def scene():
     with Containers() as world:
-        held = world.add_held(*lathe(**CUP), np.array([0.0, 0.0, CUP["height"]]))
+        held = world.add_held(wall_pieces(*lathe(**CUP), np.array([0.0, 0.0, CUP["height"]])))
         second = world.add_second(*lathe(**BOWL))
         yield world, held, second
 
@@ -60,7 +60,7 @@ def test_a_cup_inside_a_bowl_is_free_until_it_meets_the_wall_or_the_floor(scene,
 
 def test_the_rim_of_the_second_may_stand_in_the_held_cups_cavity():
     with Containers() as world:
-        held = world.add_held(*lathe(**BOWL), np.array([0.0, 0.0, BOWL["height"]]))
+        held = world.add_held(wall_pieces(*lathe(**BOWL), np.array([0.0, 0.0, BOWL["height"]])))
         second = world.add_second(*lathe(**CUP))
         upside_down = frames.transform(np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, CUP["height"] + 0.01]))
         world.move(second, np.eye(4))
@@ -76,7 +76,7 @@ def test_the_hole_of_a_handle_stays_open():
     ring.apply_translation([0.057, 0, 0.045])
     both = trimesh.util.concatenate([trimesh.Trimesh(vertices, triangles), ring])
     with Containers() as world:
-        held = world.add_held(np.array(both.vertices), np.array(both.faces), np.zeros(3))
+        held = world.add_held(wall_pieces(np.array(both.vertices), np.array(both.faces), np.zeros(3)))
         finger = trimesh.creation.box([0.004, 0.2, 0.004])
         second = world.add_second(np.array(finger.vertices), np.array(finger.faces))
         world.move(held, np.eye(4))

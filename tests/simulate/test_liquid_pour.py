@@ -3,13 +3,14 @@ import pickle
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pipeline.geometry.cavity import lip_alone, pour_axis, retained_volume_m3
-from pipeline.simulate import liquid
+from pipeline.simulate import liquid, pouring, rest
 from pipeline.simulate.liquid import Pour, Vessel
 
 # Share kept after a tilt by so many degrees in 1.0 s and a wait of 0.3 s: SPlisHSPlasH, DFSPH, 1240 particles of 5 mm.
@@ -73,6 +74,39 @@ def test_a_trial_that_ends_early_has_the_same_label(cylinder: Vessel) -> None:
         early, patient = (pour(cylinder, n, tilt, seed, patient=p) for p in (False, True))
         assert (early.n_left > 0) == (patient.n_left > 0)
         assert abs(early.n_left - patient.n_left) <= max(2, 0.03 * n)
+
+
+def test_a_shared_settled_state_gives_the_labels_that_one_of_its_own_gives(
+    cylinder: Vessel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng = np.random.default_rng(8)
+    draws = [(int(rng.integers(20, 400)), rng.uniform(0.0, 110.0), seed) for seed in range(12)]
+    shared = [pour(cylinder, *draw).n_left for draw in draws]
+    monkeypatch.setattr(pouring, "settle", lambda vessel, n, seed: rest._settled(vessel, n))
+    own = [pour(cylinder, *draw).n_left for draw in draws]
+    assert [left > 0 for left in own] == [left > 0 for left in shared]
+    assert {True, False} == {left > 0 for left in own}
+    for (n, _, _), a, b in zip(draws, own, shared, strict=True):
+        assert abs(a - b) <= max(3, 0.04 * n)
+
+
+def test_single_precision_gives_the_labels_that_double_gives(
+    cylinder: Vessel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same code compiled for arrays of doubles: the liquid's state, the wall's fields, all sums."""
+
+    def doubled(arrays: tuple) -> tuple:
+        return type(arrays)(*(a.astype(float) if a.dtype == np.float32 else a for a in arrays))
+
+    rng = np.random.default_rng(3)
+    draws = [(int(rng.integers(20, 200)), rng.uniform(0.0, 110.0), seed) for seed in range(10)]
+    single = [pour(cylinder, *draw).n_left for draw in draws]
+    finer = replace(cylinder, walls=doubled(cylinder.walls))
+    make = pouring.particles
+    monkeypatch.setattr(pouring, "particles", lambda n, walls: doubled(make(n, walls)))
+    double = [pour(finer, *draw).n_left for draw in draws]
+    assert double != single  # it really was another computation
+    assert [left > 0 for left in double] == [left > 0 for left in single]
 
 
 def test_the_same_arguments_give_the_same_bits_on_any_thread(cylinder: Vessel) -> None:

@@ -90,6 +90,25 @@ def test_the_walls_share_of_the_kernel_on_a_plane(cylinder: liquid.Vessel) -> No
     assert share[0][3] < 0  # the wall is below
 
 
+def test_the_wall_is_as_solid_when_it_is_thin(cylinder: liquid.Vessel, thin: liquid.Vessel) -> None:
+    """What is behind it, air or other liquid, has no part in the sums: 1.5 mm of wall act as 3 mm do."""
+    rng, depths = np.random.default_rng(2), (0.003, 0.0015)
+    for _ in range(40):
+        turn, out, up = rng.uniform(0.0, 2 * np.pi), rng.uniform(0.0, 0.0345), rng.uniform(0.0025, 0.08)
+        near, nearer = (
+            wall_reach(
+                w.reach,
+                w.shape,
+                w.origin,
+                w.cell,
+                *np.float32([out * np.cos(turn), out * np.sin(turn), up + z]),
+            )
+            for w, z in zip((cylinder.walls, thin.walls), depths, strict=True)
+        )
+        assert nearer[0] == pytest.approx(near[0], abs=0.03)
+        assert np.subtract(nearer[1:], near[1:]) == pytest.approx(0.0, abs=8.0)
+
+
 def test_a_particle_too_fast_stops_the_trial(cylinder: liquid.Vessel) -> None:
     p = particles(1, cylinder.walls)
     p.x[0], p.v[0], p.count[0] = (0.0, 0.0, 0.05), (0.0, 0.0, 20.0), 1

@@ -11,7 +11,7 @@ from pipeline import artefacts
 from pipeline.errors import PipelineError
 from pipeline.geometry import frames
 from pipeline.simulate import __main__ as command_line
-from pipeline.simulate import draws, trials
+from pipeline.simulate import draws, prepared, trials
 
 SPACING_M = 0.010
 HALF_FULL = draws.Pouring(fill_min=0.5, fill_max=0.5, tilt_max_rad=np.radians(120.0), threshold=1)
@@ -26,19 +26,30 @@ def lathe(inner, depth, wall=0.003):
     return np.array(mesh.vertices), np.array(mesh.faces)
 
 
+def prepare(name, mesh, folder, spacing_m=SPACING_M):
+    """Prepare a mesh (vertices, triangles) as the workflow does; return the container's file."""
+    artefacts.write_mesh(folder / f"{name}.ply", mesh)
+    path = str(folder / f"{name}.npz")
+    words = ["prepare", "--object", name, "--mesh", str(folder / f"{name}.ply"), "--container", path]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["simulate", *words, "--spacing-m", str(spacing_m)])
+        command_line.main()
+    return path
+
+
 @pytest.fixture(scope="module")
 def cup():
-    return trials.container("cup", *lathe(INNER_M, DEPTH_M), SPACING_M)
+    return prepared.container("cup", *lathe(INNER_M, DEPTH_M), SPACING_M)
 
 
 @pytest.fixture(scope="module")
 def bowl():
-    return trials.container("bowl", *lathe(0.060, 0.045), SPACING_M)
+    return prepared.container("bowl", *lathe(0.060, 0.045), SPACING_M)
 
 
 @pytest.fixture(scope="module")
 def experiment(cup, bowl):
-    low = trials.container("low", *lathe(0.028, 0.040), SPACING_M)
+    low = prepared.container("low", *lathe(0.028, 0.040), SPACING_M)
     with trials.FillingExperiment(bowl, [cup, low], FILLING) as experiment:
         yield experiment
 
@@ -97,6 +108,15 @@ def test_a_trial_is_the_same_alone_and_again(cup, experiment, pourings, fillings
     assert_same_row(trials.pouring_trial(cup, HALF_FULL, 7, seed=4), pourings.iloc[7])
     for k in (13, 2):
         assert_same_row(experiment.trial(k, seed=4), fillings.iloc[k])
+
+
+def test_a_trial_is_the_same_with_a_container_that_was_stored(cup, pourings):
+    """Down to the states at rest and the scalars' types, which the compiled code was compiled for."""
+    stored = prepared.from_arrays("cup", prepared.to_arrays(cup))
+    assert stored.vessel.settled.keys() == cup.vessel.settled.keys()
+    for value, expected in zip(stored.vessel.walls, cup.vessel.walls, strict=True):
+        assert type(value) is type(expected)
+    assert_same_row(trials.pouring_trial(stored, HALF_FULL, 7, seed=4), pourings.iloc[7])
 
 
 def test_another_seed_is_another_trial(cup, pourings):
@@ -185,23 +205,22 @@ def test_a_block_is_refused_by_name():
     block = trimesh.creation.box([0.06, 0.06, 0.06])
     block.apply_translation([0, 0, 0.03])
     with pytest.raises(PipelineError, match="block"):
-        trials.container("block", np.array(block.vertices), np.array(block.faces), SPACING_M)
+        prepared.container("block", np.array(block.vertices), np.array(block.faces), SPACING_M)
 
 
 def test_the_command_line_runs_both_experiments_twice_to_the_same_bytes(tmp_path, monkeypatch):
-    cup, bowl = tmp_path / "cup.ply", tmp_path / "bowl.ply"
-    artefacts.write_mesh(cup, lathe(INNER_M, DEPTH_M))
-    artefacts.write_mesh(bowl, lathe(0.060, 0.045))
+    cup = prepare("cup", lathe(INNER_M, DEPTH_M), tmp_path)
+    bowl = prepare("bowl", lathe(0.060, 0.045), tmp_path)
 
     def run(name, *options):
         output = tmp_path / name
-        common = ["--seed", "4", "--trials", "20", "--trials-table", str(output), "--spacing-m", "0.01"]
+        common = ["--seed", "4", "--trials", "20", "--trials-table", str(output)]
         monkeypatch.setattr(sys, "argv", ["simulate", *options, *common])
         command_line.main()
         return output.read_bytes()
 
-    pour = ["pouring", "--object", "cup", "--mesh", str(cup)]
-    fill = ["filling", "--object", "bowl", "--mesh", str(bowl), "--held", f"cup={cup}", f"bowl={bowl}"]
+    pour = ["pouring", "--object", "cup", "--container", cup]
+    fill = ["filling", "--object", "bowl", "--container", bowl, "--held", f"cup={cup}", f"bowl={bowl}"]
     assert run("p1.parquet", *pour) == run("p2.parquet", *pour)
     assert run("f1.parquet", *fill) == run("f2.parquet", *fill)
     rows = artefacts.read_table(tmp_path / "f1.parquet", "trials")
@@ -212,10 +231,10 @@ def test_the_command_line_runs_both_experiments_twice_to_the_same_bytes(tmp_path
 
 def test_bad_options_are_one_sentence(tmp_path, monkeypatch):
     output = str(tmp_path / "trials.parquet")
-    missing = str(tmp_path / "missing.ply")
+    missing = str(tmp_path / "missing.npz")
     for options, text in (
-        (["pouring", "--object", "cup", "--mesh", missing], "missing.ply"),
-        (["filling", "--object", "bowl", "--mesh", missing, "--held", "cup"], "missing.ply|NAME=MESH"),
+        (["pouring", "--object", "cup", "--container", missing], "missing.npz"),
+        (["filling", "--object", "bowl", "--container", missing, "--held", "cup"], "missing.npz|NAME=FILE"),
     ):
         monkeypatch.setattr(sys, "argv", ["simulate", *options, "--trials-table", output])
         with pytest.raises(PipelineError, match=text):

@@ -18,12 +18,22 @@ def _each(rule: str, objects=frozenset(OBJECTS)) -> set[str]:
 
 
 SIMULATED = _each("simulate_pouring") | _each("simulate_filling") | CLASSIFIED
-WARPED = _each("warp") | _each("parametrise") | ASSEMBLED | CLASSIFIED | {"draw_labels"}
+CONTAINED = _each("simulate_container") | SIMULATED
+COMPARED = _each("accuracy")
+WARPED = _each("warp") | _each("parametrise") | ASSEMBLED | COMPARED | CLASSIFIED | {"draw_labels"}
 
 
 def _of_one(name: str) -> set[str]:
     """Return all that follows from the scan of an object that is neither source nor held."""
-    stages = ("fuse", "label", "warp", "parametrise", "simulate_pouring", "simulate_filling")
+    stages = (
+        "fuse",
+        "label",
+        "warp",
+        "parametrise",
+        "simulate_container",
+        "simulate_pouring",
+        "simulate_filling",
+    )
     return {f"{stage} {name}" for stage in stages} | ASSEMBLED | CLASSIFIED | {"draw_labels"}
 
 
@@ -73,12 +83,13 @@ def test_one_core_gives_the_same_bytes_as_two(finished, unfinished):
 @pytest.mark.parametrize(
     ("key", "value", "jobs"),
     [
-        ("scan.noise", 0.5, _each("scan") | _each("fuse") | _each("label") | WARPED | SIMULATED),
-        ("fuse.points", 7000, _each("fuse") | _each("label") | WARPED | SIMULATED),
+        ("scan.noise", 0.5, _each("scan") | _each("fuse") | _each("label") | WARPED | CONTAINED),
+        ("fuse.points", 7000, _each("fuse") | _each("label") | WARPED | CONTAINED),
         ("label.ridge", 2.0, _each("label") | WARPED),
         ("warp.k", 2, WARPED),
-        ("parametrise.hull_points", 3000, _each("parametrise") | ASSEMBLED | CLASSIFIED),
+        ("parametrise.hull_points", 3000, _each("parametrise") | ASSEMBLED | CLASSIFIED | COMPARED),
         ("simulate.seed", 40, SIMULATED),
+        ("simulate.spacing_m", 0.015, CONTAINED),
         ("simulate.engine", "bullet", SIMULATED),
         ("simulate.physics.convergence_trials", 3, set()),
         ("simulate.pouring.tilt_max_deg", 90.0, _each("simulate_pouring") | {"classify pouring", "report"}),
@@ -120,9 +131,10 @@ def test_two_keys_that_swap_their_values_are_a_change(project):
 @pytest.mark.parametrize(
     ("module", "jobs"),
     [
-        ("scan/camera.py", _each("scan") | _each("fuse") | _each("label") | WARPED | SIMULATED),
+        ("scan/camera.py", _each("scan") | _each("fuse") | _each("label") | WARPED | CONTAINED),
         ("label/features.py", _each("label") | WARPED),
         ("simulate/trials.py", SIMULATED),
+        ("simulate/fields.py", CONTAINED),
         ("classify/regression.py", CLASSIFIED),
         ("report/roc.py", {"report"}),
         ("track/store.py", set()),
@@ -146,12 +158,12 @@ def test_comments_and_touched_files_rerun_nothing(project):
 def test_a_changed_scan_reruns_its_object_alone(project):
     scan = project / "data/raw/wide_bowl"
     (scan / "frame-000000.depth.png").write_bytes((scan / "frame-000001.depth.png").read_bytes())
-    assert project.planned() == _of_one("wide_bowl")
+    assert project.planned() == _of_one("wide_bowl") | {"accuracy wide_bowl"}
 
 
 def test_a_changed_scan_of_a_held_cup_reruns_every_filling(project):
     _append(project / "data/raw/short_cup/camera-intrinsics.txt", "\n")
-    assert project.planned() == _of_one("short_cup") | _each("simulate_filling")
+    assert project.planned() == _of_one("short_cup") | _each("simulate_filling") | {"accuracy short_cup"}
 
 
 def test_a_changed_annotation_reruns_the_labels(project):

@@ -1,7 +1,29 @@
 # Needs the curves and scores of both experiments; for the numbers also what every stage made, and the demonstration objects' truth.
+# Makes report/accuracy/<object>.json, a demonstration object's errors against its truth.
 # Makes reports/roc.pdf (the paper's Fig. 3) with reports/metrics.json (every headline number), and reports/labels.pdf (Fig. 2);
 #       when asked for, reports/physics.pdf and reports/physics.json, the liquid against hydrostatics and against Bullet's spheres.
 # How: one module a figure; truth is compared here and nowhere else.
+
+
+rule accuracy:
+    input:
+        truth=rules.scan.output.truth,
+        fuse=rules.fuse.output,
+        label=rules.label.output.labels,
+        warp=expand(rules.warp.output, source=SOURCE, allow_missing=True),
+        parametrise=expand(rules.parametrise.output.parameters, source=SOURCE, allow_missing=True),
+    output:
+        errors=f"{PROCESSED}/report/accuracy/{{object}}.json",
+    log:
+        "logs/report/accuracy/{object}.log",
+    threads: 1
+    params:
+        processed=PROCESSED,
+        source=SOURCE,
+        code=code("pipeline.report.accuracy"),
+    shell:
+        "python -m pipeline.report.accuracy --processed {params.processed:q} --source {params.source} --object {wildcards.object}"
+        " --errors {output.errors:q} > {log:q} 2>&1"
 
 
 rule report:
@@ -9,9 +31,7 @@ rule report:
         curves=expand(rules.classify.output.curves, experiment=EXPERIMENTS),
         scores=expand(rules.classify.output.scores, experiment=EXPERIMENTS),
         predictions=expand(rules.classify.output.predictions, experiment=EXPERIMENTS),
-        truth=each(rules.scan.output.truth, FOUND.demonstration),
-        fuse=each(list(rules.fuse.output)),
-        label=each(rules.label.output.labels),
+        accuracy=each(rules.accuracy.output.errors, FOUND.demonstration),
         warp=each(list(rules.warp.output)),
         parametrise=[rules.assemble_parameters.output[0], rules.assemble_tilt_references.output[0]],
         pouring=each(rules.simulate_pouring.output.trials),
@@ -32,7 +52,7 @@ rule report:
     shell:
         "python -m pipeline.report.roc --curves {input.curves:q} --scores {input.scores:q} --output {output.roc:q} > {log:q} 2>&1\n"
         "python -m pipeline.report.metrics --processed {params.processed:q} --source {params.source} --objects {params.objects}"
-        " --output {output.metrics:q} >> {log:q} 2>&1"
+        " --accuracy {input.accuracy:q} --output {output.metrics:q} >> {log:q} 2>&1"
 
 
 TARGETS = [name for name in OBJECTS if name != SOURCE]

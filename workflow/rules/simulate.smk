@@ -1,6 +1,7 @@
-# Needs the fused meshes: an object's own, and for filling those of the held cups.
-# Makes simulate/<experiment>/<object>/trials.parquet: what was poured, and what happened; for the page on the liquid's physics also
-#       simulate/physics/: the liquid measured in vessels of known shape and in each object.
+# Needs the fused meshes.
+# Makes simulate/containers/<object>.npz: the object made ready for trials; simulate/<experiment>/<object>/trials.parquet: what was poured,
+#       and what happened; for the page on the liquid's physics also simulate/physics/: the liquid measured in vessels of known shape and
+#       in each object.
 # How: Bullet moves the containers and finds collisions, particles are the liquid. Progress goes to the terminal and to the log.
 
 HELD = config["simulate"]["filling"]["held_objects"]
@@ -13,9 +14,27 @@ wildcard_constraints:
     engine="|".join(ENGINES),
 
 
-rule simulate_pouring:
+rule simulate_container:
     input:
         mesh=rules.fuse.output.mesh,
+    output:
+        container=f"{PROCESSED}/simulate/containers/{{object}}.npz",
+    log:
+        "logs/simulate/containers/{object}.log",
+    benchmark:
+        "benchmarks/simulate/containers/{object}.tsv"
+    threads: 1
+    params:
+        options=options("simulate", "spacing_m"),
+        code=code("pipeline.simulate.prepared"),
+    shell:
+        "python -m pipeline.simulate prepare --object {wildcards.object} --mesh {input.mesh:q} --container {output.container:q}"
+        " {params.options} > {log:q} 2>&1"
+
+
+rule simulate_pouring:
+    input:
+        container=rules.simulate_container.output.container,
     output:
         trials=f"{PROCESSED}/simulate/pouring/{{object}}/trials.parquet",
     log:
@@ -24,18 +43,18 @@ rule simulate_pouring:
         "benchmarks/simulate/pouring/{object}.tsv"
     threads: 1
     params:
-        shared=options("simulate", "engine", "spacing_m", "seed"),
+        shared=options("simulate", "engine", "seed"),
         options=options("simulate.pouring", "trials", "fill_min", "fill_max", "tilt_max_deg", "threshold"),
         code=code("pipeline.simulate"),
     shell:
-        "python -m pipeline.simulate pouring --object {wildcards.object} --mesh {input.mesh:q} --trials-table {output.trials:q}"
+        "python -m pipeline.simulate pouring --object {wildcards.object} --container {input.container:q} --trials-table {output.trials:q}"
         " {params.shared} {params.options} 2>&1 | tee {log:q} >&2"
 
 
 rule simulate_filling:
     input:
-        mesh=rules.fuse.output.mesh,
-        held=expand(rules.fuse.output.mesh, object=HELD),
+        container=rules.simulate_container.output.container,
+        held=expand(rules.simulate_container.output.container, object=HELD),
     output:
         trials=f"{PROCESSED}/simulate/filling/{{object}}/trials.parquet",
     log:
@@ -45,8 +64,8 @@ rule simulate_filling:
     threads: 1
     params:
         # The order of the cups decides which one a trial draws.
-        held=" ".join(f"{name}={PROCESSED}/fuse/{name}/mesh.ply" for name in HELD),
-        shared=options("simulate", "engine", "spacing_m", "seed"),
+        held=" ".join(f"{name}={PROCESSED}/simulate/containers/{name}.npz" for name in HELD),
+        shared=options("simulate", "engine", "seed"),
         options=options(
             "simulate.filling",
             "trials",
@@ -59,7 +78,7 @@ rule simulate_filling:
         ),
         code=code("pipeline.simulate"),
     shell:
-        "python -m pipeline.simulate filling --object {wildcards.object} --mesh {input.mesh:q} --held {params.held}"
+        "python -m pipeline.simulate filling --object {wildcards.object} --container {input.container:q} --held {params.held}"
         " --trials-table {output.trials:q} {params.shared} {params.options} 2>&1 | tee {log:q} >&2"
 
 
@@ -92,7 +111,7 @@ rule physics_object:
         "benchmarks/simulate/physics/{object}.tsv"
     threads: 1
     params:
-        held=rules.simulate_filling.params.held,
+        held=" ".join(f"{name}={PROCESSED}/fuse/{name}/mesh.ply" for name in HELD),
         shared=options("simulate", "spacing_m", "seed"),
         threshold=options("simulate.pouring", "threshold"),
         options=options("simulate.physics", "convergence_trials"),
@@ -111,7 +130,7 @@ use rule simulate_pouring as simulate_pouring_other with:
     benchmark:
         "benchmarks/simulate/physics/{object}_{engine}_pouring.tsv"
     params:
-        shared=options("simulate", "spacing_m", "seed") + " --engine {engine}",
+        shared=options("simulate", "seed") + " --engine {engine}",
         options=options("simulate.pouring", "fill_min", "fill_max", "tilt_max_deg", "threshold")
         + f" --trials {config['simulate']['physics']['engine_pours']}",
         code=code("pipeline.simulate"),
@@ -126,7 +145,7 @@ use rule simulate_filling as simulate_filling_other with:
         "benchmarks/simulate/physics/{object}_{engine}_filling.tsv"
     params:
         held=rules.simulate_filling.params.held,
-        shared=options("simulate", "spacing_m", "seed") + " --engine {engine}",
+        shared=options("simulate", "seed") + " --engine {engine}",
         options=options(
             "simulate.filling",
             "held_particles",

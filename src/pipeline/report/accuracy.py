@@ -6,13 +6,25 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from pipeline.artefacts import normals, points, read_json, read_mesh, read_table
+from pipeline import command
+from pipeline.artefacts import normals, points, read_json, read_mesh, read_table, write_json
 from pipeline.geometry import frames, hulls
 from pipeline.geometry.cavity import cavity
 from pipeline.geometry.surface import Surface
 
 PARTS = ("container", "rim", "handle")
 SCALARS = {"radius": "radius_m", "height": "height_m", "capacity": "capacity_m3", "hull_volume": "volume_m3"}
+
+
+def main() -> None:
+    """Compare what the stages found of one demonstration object with its truth; write the errors."""
+    parser = command.parser(__doc__)
+    parser.add_argument("--processed", type=Path, required=True, help="folder of the stages' artefacts")
+    parser.add_argument("--source", required=True, help="name of the annotated object")
+    parser.add_argument("--object", required=True, help="name of the demonstration object")
+    parser.add_argument("--errors", type=Path, required=True, help="errors to write, JSON")
+    options = parser.parse_args()
+    write_json(options.errors, errors(options.processed, options.source, options.object))
 
 
 @dataclass(frozen=True)
@@ -34,6 +46,30 @@ def read_truth(processed: Path, name: str) -> Truth:
     return Truth(
         facts, read_table(folder / "truth.parquet", "truth"), read_mesh(folder / "truth.ply"), T_truth_object
     )
+
+
+def errors(processed: Path, source: str, name: str) -> dict[str, float]:
+    """Return all errors of one object as `<stage>.<what>`; of labels, where it is not the source."""
+    truth = read_truth(processed, name)
+    found = {f"fuse.{key}": value for key, value in fusion_errors(processed, name, truth).items()}
+    parameters = read_table(processed / "parametrise" / source / f"{name}.parquet", "parameters")
+    for mapping, row in parameters.set_index("mapping").iterrows():
+        found |= {
+            f"parametrise.{mapping}.{key}": value for key, value in parameter_errors(row, truth).items()
+        }
+    return found | (label_errors(processed, source, name, truth) if name != source else {})
+
+
+def label_errors(processed: Path, source: str, name: str, truth: Truth) -> dict[str, float]:
+    """Return the scores of initial labels (`label.`) and of mapped labels (`warp_label_mapping.`)."""
+    initial = read_table(processed / "label" / name / "labels.parquet", "labels")
+    mapped = read_table(processed / "warp" / source / name / "label_mapping.parquet", "mapping")
+    parts = true_parts(initial, truth)
+    return {
+        f"{stage}.{key}": value
+        for stage, table in (("label", initial), ("warp_label_mapping", mapped))
+        for key, value in label_scores(table, parts).items()
+    }
 
 
 def fusion_errors(processed: Path, name: str, truth: Truth) -> dict[str, float]:
@@ -111,3 +147,7 @@ def parameter_errors(row: pd.Series, truth: Truth) -> dict[str, float]:
     true_tilt_rad = hulls.tilt_reference_rad(inside_m, true_lip_m, opening_m)
     errors["tilt_reference_deg"] = float(np.degrees(row["tilt_reference_rad"] - true_tilt_rad))
     return errors
+
+
+if __name__ == "__main__":
+    command.run(main)

@@ -1,6 +1,7 @@
 """Collect every headline number into one flat JSON object: fusion, labels, parameters, trials, classifiers, the paper's claims."""
 
 from collections import defaultdict
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,8 +10,6 @@ from pipeline.artefacts import read_json, read_table, write_json
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from pipeline.report.accuracy import Truth
 
 EXPERIMENTS = {"pouring": "poured", "filling": "filled"}
 MAPPINGS = ("label_mapping", "point_mapping")
@@ -24,14 +23,16 @@ def main() -> None:
     parser.add_argument("--processed", type=Path, required=True, help="folder of the stages' artefacts")
     parser.add_argument("--source", required=True, help="name of the annotated object")
     parser.add_argument("--objects", nargs="+", required=True, help="names of all objects that take part")
+    parser.add_argument(
+        "--accuracy", type=Path, nargs="*", default=[], help="errors of the demonstration objects"
+    )
     parser.add_argument("--output", type=Path, required=True)
     options = parser.parse_args()
 
     from pipeline.report.claims import claims
 
     processed, source = options.processed, options.source
-    known = [name for name in options.objects if (processed / "scan" / name / "truth.json").exists()]
-    metrics = accuracy_metrics(processed, source, known)
+    metrics = accuracy_metrics({path.stem: read_json(path) for path in options.accuracy})
     metrics |= warp_metrics(processed, source, options.objects)
     for experiment in EXPERIMENTS:
         metrics |= trial_metrics(processed, experiment, options.objects)
@@ -42,42 +43,17 @@ def main() -> None:
     write_json(options.output, {name: value for name, value in metrics.items() if value == value})
 
 
-def accuracy_metrics(processed: Path, source: str, known: list[str]) -> Metrics:
-    """Return errors against the known geometry of the demonstration objects; labels: over those that are not the source."""
-    from pipeline.report import accuracy
-
-    parameters = read_table(processed / "parametrise" / source / "parameters.parquet", "parameters")
+def accuracy_metrics(of_objects: Mapping[str, Metrics]) -> Metrics:
+    """Return the errors of the demonstration objects against their truth, of each (`accuracy`'s) and over all of them."""
     found: dict[str, list[float]] = defaultdict(list)
     metrics: Metrics = {}
-    for name in known:
-        truth = accuracy.read_truth(processed, name)
-        for key, value in accuracy.fusion_errors(processed, name, truth).items():
-            metrics[f"fuse.{name}.{key}"] = value
-            found[f"fuse.{key}"].append(value)
-        for mapping in MAPPINGS:
-            row = parameters[(parameters["object"] == name) & (parameters["mapping"] == mapping)].iloc[0]
-            for key, value in accuracy.parameter_errors(row, truth).items():
-                metrics[f"parametrise.{mapping}.{name}.{key}_error"] = value
-                found[f"parametrise.{mapping}.{key}"].append(value)
-        if name != source:
-            for key, value in _labels(processed, source, name, truth).items():
-                metrics[f"{key.replace('.', f'.{name}.', 1)}"] = value
-                found[key].append(value)
-    return metrics | _headlines(found) if known else metrics
-
-
-def _labels(processed: Path, source: str, name: str, truth: "Truth") -> Metrics:
-    """Return the scores of initial labels (`label.`) and of mapped labels (`warp.label_mapping.`)."""
-    from pipeline.report import accuracy
-
-    initial = read_table(processed / "label" / name / "labels.parquet", "labels")
-    mapped = read_table(processed / "warp" / source / name / "label_mapping.parquet", "mapping")
-    parts = accuracy.true_parts(initial, truth)
-    return {
-        f"{stage}.{key}": value
-        for stage, table in (("label", initial), ("warp_label_mapping", mapped))
-        for key, value in accuracy.label_scores(table, parts).items()
-    }
+    for name, errors in of_objects.items():
+        for key, value in errors.items():
+            stage, *mapping, what = key.split(".", 2 if key.startswith("parametrise") else 1)
+            end = "_error" if stage == "parametrise" else ""
+            metrics[".".join([stage, *mapping, name, f"{what}{end}"])] = value
+            found[key].append(value)
+    return metrics | _headlines(found) if found else metrics
 
 
 def _headlines(found: dict[str, list[float]]) -> Metrics:

@@ -1,4 +1,4 @@
-"""Simulate an object's trials: `pouring` from it, or `filling` it from the held cups (paper, Section IV-A)."""
+"""Simulate an object's trials: `prepare` it, then `pouring` from it, or `filling` it from held cups (paper, Section IV-A)."""
 
 import argparse
 from pathlib import Path
@@ -9,45 +9,52 @@ from pipeline import artefacts, command
 
 
 def main() -> None:
-    """Read the options and run all trials of one object and experiment, in one process."""
+    """Read the options; prepare an object, or run all trials of one object and experiment, in one process."""
     options = _options()
-    rows = _pouring(options) if options.experiment == "pouring" else _filling(options)
-    import pandas as pd
+    if options.experiment == "prepare":
+        _prepare(options)
+    else:
+        import pandas as pd
 
-    artefacts.write_table(options.trials_table, pd.DataFrame(rows), "trials")
+        rows = _pouring(options) if options.experiment == "pouring" else _filling(options)
+        artefacts.write_table(options.trials_table, pd.DataFrame(rows), "trials")
 
 
 def _options() -> argparse.Namespace:
     parser = command.parser(__doc__)
     experiments = parser.add_subparsers(dest="experiment", required=True)
-    pouring, filling = (
+    prepare, pouring, filling = (
         experiments.add_parser(
             name, help=text, allow_abbrev=False, formatter_class=argparse.ArgumentDefaultsHelpFormatter
         )
         for name, text in (
+            ("prepare", "make the object ready, once for all its trials"),
             ("pouring", "tilt the object, filled at random"),
             ("filling", "pour into the object"),
         )
     )
+    prepare.add_argument("--object", required=True, help="name of the object")
+    prepare.add_argument("--mesh", type=Path, required=True, help="its fused mesh (PLY, metres, upright)")
+    prepare.add_argument("--spacing-m", type=float, default=0.010, help="particle spacing")
+    prepare.add_argument("--container", type=Path, required=True, help="where it is written (NPZ)")
     for experiment in (pouring, filling):
         experiment.add_argument("--object", required=True, help="name of the object")
-        experiment.add_argument(
-            "--mesh", type=Path, required=True, help="its fused mesh (PLY, metres, upright)"
-        )
+        experiment.add_argument("--container", type=Path, required=True, help="what `prepare` made of it")
         experiment.add_argument(
             "--trials-table", type=Path, required=True, help="where the trials are written"
         )
         experiment.add_argument(
             "--engine", default="liquid", help="what is poured: liquid, bullet or bullet_fluid"
         )
-        experiment.add_argument("--spacing-m", type=float, default=0.010, help="particle spacing")
         experiment.add_argument("--seed", type=int, default=4, help="of the whole experiment")
         experiment.add_argument("--trials", type=int, default=1000, help="number of trials")
     pouring.add_argument("--fill-min", type=float, default=0.05, help="least fill, share of the capacity")
     pouring.add_argument("--fill-max", type=float, default=1.0, help="largest fill, share of the capacity")
     pouring.add_argument("--tilt-max-deg", type=float, default=120.0, help="largest tilt")
     pouring.add_argument("--threshold", type=int, default=1, help="particles that make a pour")
-    filling.add_argument("--held", nargs="+", required=True, metavar="NAME=MESH", help="held cups, in order")
+    filling.add_argument(
+        "--held", nargs="+", required=True, metavar="NAME=FILE", help="held cups, prepared, in order"
+    )
     filling.add_argument("--held-particles", type=int, default=10, help="particles in the held cup")
     filling.add_argument("--tilt-deg", type=float, default=120.0, help="tilt of the held cup")
     filling.add_argument(
@@ -68,20 +75,27 @@ def _options() -> argparse.Namespace:
     return parser.parse_args()
 
 
+def _prepare(options: argparse.Namespace) -> None:
+    from pipeline.simulate import prepared
+
+    ready = prepared.container(options.object, *artefacts.read_mesh(options.mesh), options.spacing_m)
+    artefacts.write_arrays(options.container, prepared.to_arrays(ready))
+
+
 def _pouring(options: argparse.Namespace) -> list[dict]:
-    from pipeline.simulate import draws, engines, trials
+    from pipeline.simulate import draws, engines, prepared, trials
 
     engine = engines.engine(options.engine)
     protocol = draws.Pouring(
         options.fill_min, options.fill_max, float(np.radians(options.tilt_max_deg)), options.threshold
     )
-    cup = trials.container(options.object, *artefacts.read_mesh(options.mesh), options.spacing_m, engine)
+    cup = prepared.from_arrays(options.object, artefacts.read_arrays(options.container), engine)
     numbers = command.progress(range(options.trials), options.trials, f"pouring {options.object}")
     return [trials.pouring_trial(cup, protocol, number, options.seed) for number in numbers]
 
 
 def _filling(options: argparse.Namespace) -> list[dict]:
-    from pipeline.simulate import draws, engines, trials
+    from pipeline.simulate import draws, engines, prepared, trials
 
     engine = engines.engine(options.engine)
     protocol = draws.Filling(
@@ -92,9 +106,9 @@ def _filling(options: argparse.Namespace) -> list[dict]:
         height_max=options.height_max,
         free_room_max_particles=options.free_room_max_particles,
     )
-    second = trials.container(options.object, *artefacts.read_mesh(options.mesh), options.spacing_m, engine)
+    second = prepared.from_arrays(options.object, artefacts.read_arrays(options.container), engine)
     held = [
-        trials.container(name, *artefacts.read_mesh(path), options.spacing_m, engine)
+        prepared.from_arrays(name, artefacts.read_arrays(path), engine)
         for name, path in map(command.name_and_path, options.held)
     ]
     numbers = command.progress(range(options.trials), options.trials, f"filling {options.object}")

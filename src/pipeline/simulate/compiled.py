@@ -32,6 +32,8 @@ def _cache_folder() -> str:
 
 numba.config.CACHE_DIR = _cache_folder()  # type: ignore[attr-defined]
 
-compiled = njit(cache=True, nogil=True, fastmath=_FAST)
-part = njit(cache=True, nogil=True, fastmath=_FAST, forceinline=True)
-inlined = njit(cache=True, nogil=True, fastmath=_FAST, inline="always")  # also spares counting references
+compiled = njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+part = njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy", forceinline=True)
+inlined = njit(
+    cache=True, nogil=True, fastmath=_FAST, error_model="numpy", inline="always"
+)  # also spares counting references

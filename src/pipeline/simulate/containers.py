@@ -23,6 +23,7 @@ _EDGE_M = 0.005  # triangles are cut to this size, so that cells share them even
 # Triangles of the second, by its area: edges of about 9 mm, 0.4 mm within a rim of 25 mm radius.
 _TRIANGLE_M2 = 3.5e-5
 _TRIANGLES = (400, 1600)
+_MANY, _MERGED_M = 20, 0.0015
 _DIRECTIONS = 96
 _SCOUT_STRIDE = 4  # a quarter of the pieces finds most contacts at the start, at a quarter of the cost
 # Bullet's motion in steps: never further than the gap allows, never finer than this.
@@ -51,8 +52,7 @@ class Containers:
             self._client = -1
 
     def add_second(self, vertices_m: np.ndarray, triangles: np.ndarray) -> int:
-        """Add a static container by its mesh (V, 3), (F, 3) in its object frame; return Bullet's number of the body."""
-        vertices_m, triangles = decimated(vertices_m, triangles)
+        """Add a static container by a coarse mesh (V, 3), (F, 3) in its object frame; return Bullet's number of the body."""
         shape = pybullet.createCollisionShape(
             pybullet.GEOM_MESH,
             vertices=vertices_m.tolist(),
@@ -62,14 +62,14 @@ class Containers:
         )
         return pybullet.createMultiBody(0.0, shape, physicsClientId=self._client)
 
-    def add_held(self, vertices_m: np.ndarray, triangles: np.ndarray, centre_m: np.ndarray) -> int:
-        """Add a container that moves, by its mesh and its opening's centre (object frame); return the body's number."""
+    def add_held(self, pieces: list[np.ndarray]) -> int:
+        """Add a container that moves, by its `wall_pieces`; return the body's number."""
         from scipy.spatial import ConvexHull
 
-        pieces = wall_pieces(vertices_m, triangles, centre_m)
         body = self._compound(pieces)
         self._scout[body] = self._compound(pieces[::_SCOUT_STRIDE])
-        self._hull_m[body] = vertices_m[ConvexHull(vertices_m).vertices]
+        points = np.concatenate(pieces)
+        self._hull_m[body] = points[ConvexHull(points).vertices]
         return body
 
     def _compound(self, pieces: list[np.ndarray]) -> int:
@@ -194,13 +194,16 @@ def _obj(pieces: list[np.ndarray]) -> str:
 
 
 def decimated(vertices_m: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return a mesh with few enough triangles for Bullet: neighbours merged first, which is fast, then quadric decimation."""
     import open3d as o3d
 
     mesh = o3d.geometry.TriangleMesh(
         o3d.utility.Vector3dVector(vertices_m), o3d.utility.Vector3iVector(triangles)
     )
     n = int(np.clip(mesh.get_surface_area() / _TRIANGLE_M2, *_TRIANGLES))
-    if len(triangles) > n:
+    if len(triangles) > _MANY * n:
+        mesh = mesh.simplify_vertex_clustering(_MERGED_M, o3d.geometry.SimplificationContraction.Quadric)
+    if len(mesh.triangles) > n:
         mesh = mesh.simplify_quadric_decimation(n)
     return np.asarray(mesh.vertices), np.asarray(mesh.triangles)
 

@@ -50,28 +50,13 @@ def _sort(p, walls):
 
 
 @part
-def _measure(p, walls):
-    """Find the pairs (each once), the density of each particle, its gradients and the drift of its neighbours.
-
-    Returns whether the pairs fitted into their room.
-    """
-    n = p.count[0]
-    x, v, other, slope, first, bin_start = p.x, p.v, p.other, p.slope, p.first, p.bin_start
-    density, squares, total, wall, drift = p.density, p.squares, p.total, p.wall, p.drift
+def _find(p, walls):
+    """Find the pairs, each once, and the way `apart` from its second to its first; return whether they had room."""
+    x, other, first, bin_start = p.x, p.other, p.first, p.bin_start
+    apart_x, apart_y, apart_z = p.slope_x, p.slope_y, p.slope_z
     bx, by, bz = walls.bins[0], walls.bins[1], walls.bins[2]
     h = np.float32(SUPPORT) * walls.spacing
-    hh, volume = h * h, walls.spacing * walls.spacing * walls.spacing
-    norm = np.float32(8.0 / np.pi) * volume / (h * h * h)
-    steep = norm / h
-    one, two, six = np.float32(1.0), np.float32(2.0), np.float32(6.0)
-    half, tiny = np.float32(0.5), np.float32(1e-9)
-    reach, shape, origin, cell = walls.reach, walls.shape, walls.origin, walls.cell
-    for i in range(n):
-        share, gx, gy, gz = wall_reach(reach, shape, origin, cell, x[i, 0], x[i, 1], x[i, 2])
-        wall[i, 0], wall[i, 1], wall[i, 2] = gx, gy, gz
-        total[i, 0], total[i, 1], total[i, 2] = gx, gy, gz
-        density[i], squares[i] = share + norm, np.float32(0.0)
-        drift[i, 0] = drift[i, 1] = drift[i, 2] = np.float32(0.0)
+    hh = h * h
     k, room = np.uint64(0), other.shape[0]
     for b in range(bx * by * bz):
         if bin_start[b] == bin_start[b + 1]:
@@ -81,8 +66,6 @@ def _measure(p, walls):
         for i in range(np.uint64(bin_start[b]), np.uint64(bin_start[b + 1])):
             first[i] = k
             xi, yi, zi = x[i, 0], x[i, 1], x[i, 2]
-            ui, vi, wi = v[i, 0], v[i, 1], v[i, 2]
-            den = sq = sx = sy = sz = du = dv = dw = np.float32(0.0)
             for row in range(5):
                 jy = iy if row == 0 else (iy + 1 if row == 1 else iy + row - 3)
                 jz = iz if row < 2 else iz + 1
@@ -94,48 +77,90 @@ def _measure(p, walls):
                     return False
                 for j in range(np.uint64(begin), np.uint64(end)):
                     dx, dy, dz = xi - x[j, 0], yi - x[j, 1], zi - x[j, 2]
-                    other[k] = j
+                    other[k], apart_x[k], apart_y[k], apart_z[k] = j, dx, dy, dz
                     k += np.uint64(dx * dx + dy * dy + dz * dz < hh)
-            for pair in range(np.uint64(first[i]), k):
-                j = other[pair]
-                dx, dy, dz = xi - x[j, 0], yi - x[j, 1], zi - x[j, 2]
-                r = np.sqrt(dx * dx + dy * dy + dz * dz) + tiny
-                q = r / h
-                away = max(one - q, np.float32(0.0))
-                inner = max(half - q, np.float32(0.0))
-                # The cubic spline as 2 (1 − q)³ − 8 (½ − q)³: no branch.
-                w = norm * (two * away * away * away - np.float32(8.0) * inner * inner * inner)
-                s = steep * (np.float32(24.0) * inner * inner - six * away * away) / r
-                gx, gy, gz = s * dx, s * dy, s * dz
-                gg = gx * gx + gy * gy + gz * gz
-                slope[pair, 0], slope[pair, 1], slope[pair, 2] = gx, gy, gz
-                den += w
-                sq += gg
-                sx += gx
-                sy += gy
-                sz += gz
-                density[j] += w
-                squares[j] += gg
-                total[j, 0] -= gx
-                total[j, 1] -= gy
-                total[j, 2] -= gz
-                a, e, f = w * (v[j, 0] - ui), w * (v[j, 1] - vi), w * (v[j, 2] - wi)
-                du += a
-                dv += e
-                dw += f
-                drift[j, 0] -= a
-                drift[j, 1] -= e
-                drift[j, 2] -= f
-            density[i] += den
-            squares[i] += sq
-            total[i, 0] += sx
-            total[i, 1] += sy
-            total[i, 2] += sz
-            drift[i, 0] += du
-            drift[i, 1] += dv
-            drift[i, 2] += dw
-    first[n] = k
+    first[p.count[0]] = k
     return True
+
+
+@part
+def _slopes(p, walls):
+    """Turn each pair's way `apart` into the kernel's gradient there; set its weight. No branches, so that it runs in vectors."""
+    weight, slope_x, slope_y, slope_z = p.weight, p.slope_x, p.slope_y, p.slope_z
+    h = np.float32(SUPPORT) * walls.spacing
+    norm = _norm(walls, h)
+    steep, per_h = norm / h, np.float32(1.0) / h
+    none, half, one = np.float32(0.0), np.float32(0.5), np.float32(1.0)
+    two, six, eight, many = np.float32(2.0), np.float32(6.0), np.float32(8.0), np.float32(24.0)
+    for k in range(np.uint64(p.first[p.count[0]])):
+        dx, dy, dz = slope_x[k], slope_y[k], slope_z[k]
+        r = np.sqrt(dx * dx + dy * dy + dz * dz + np.float32(1e-14))
+        q = r * per_h
+        away, inner = max(one - q, none), max(half - q, none)
+        # The cubic spline as 2 (1 − q)³ − 8 (½ − q)³: no branch.
+        weight[k] = norm * (two * away * away * away - eight * inner * inner * inner)
+        s = steep * (many * inner * inner - six * away * away) / r
+        slope_x[k], slope_y[k], slope_z[k] = s * dx, s * dy, s * dz
+
+
+@part
+def _norm(walls, h):
+    """Return the kernel's factor for particles of volume spacing³."""
+    return np.float32(8.0 / np.pi) * walls.spacing * walls.spacing * walls.spacing / (h * h * h)
+
+
+@part
+def _sum(p, walls):
+    """Sum over the pairs into `sums`, from the wall's share on: density, its gradient and its square, change of velocity.
+
+    The change of velocity is viscosity's and that of the impulses in `change`, the last step's.
+    """
+    n = p.count[0]
+    x, v, sums, wall, change = p.x, p.v, p.sums, p.wall, p.change
+    other, first, weight = p.other, p.first, p.weight
+    slope_x, slope_y, slope_z = p.slope_x, p.slope_y, p.slope_z
+    reach, shape, origin, cell = walls.reach, walls.shape, walls.origin, walls.cell
+    none, viscosity = np.float32(0.0), np.float32(VISCOSITY)
+    own = _norm(walls, np.float32(SUPPORT) * walls.spacing)
+    for i in range(n):
+        share, gx, gy, gz = wall_reach(reach, shape, origin, cell, x[i, 0], x[i, 1], x[i, 2])
+        c = change[i]
+        wall[i, 0], wall[i, 1], wall[i, 2] = gx, gy, gz
+        sums[i, 0], sums[i, 1], sums[i, 2], sums[i, 3], sums[i, 4] = share + own, none, gx, gy, gz
+        sums[i, 5], sums[i, 6], sums[i, 7] = -c * gx, -c * gy, -c * gz
+    for i in range(n):
+        ui, vi, wi, ci = v[i, 0], v[i, 1], v[i, 2], change[i]
+        den = sq = sx = sy = sz = du = dv = dw = none
+        for k in range(np.uint64(first[i]), np.uint64(first[i + 1])):
+            j = other[k]
+            w, gx, gy, gz = weight[k], slope_x[k], slope_y[k], slope_z[k]
+            gg = gx * gx + gy * gy + gz * gz
+            c, m = ci + change[j], viscosity * w
+            a, e, f = m * (v[j, 0] - ui) - c * gx, m * (v[j, 1] - vi) - c * gy, m * (v[j, 2] - wi) - c * gz
+            den += w
+            sq += gg
+            sx += gx
+            sy += gy
+            sz += gz
+            du += a
+            dv += e
+            dw += f
+            sums[j, 0] += w
+            sums[j, 1] += gg
+            sums[j, 2] -= gx
+            sums[j, 3] -= gy
+            sums[j, 4] -= gz
+            sums[j, 5] -= a
+            sums[j, 6] -= e
+            sums[j, 7] -= f
+        sums[i, 0] += den
+        sums[i, 1] += sq
+        sums[i, 2] += sx
+        sums[i, 3] += sy
+        sums[i, 4] += sz
+        sums[i, 5] += du
+        sums[i, 6] += dv
+        sums[i, 7] += dw
 
 
 @part
@@ -147,7 +172,7 @@ def _push(p):
         for k in range(np.uint64(p.first[i]), np.uint64(p.first[i + 1])):
             j = p.other[k]
             s = c + p.change[j]
-            gx, gy, gz = s * p.slope[k, 0], s * p.slope[k, 1], s * p.slope[k, 2]
+            gx, gy, gz = s * p.slope_x[k], s * p.slope_y[k], s * p.slope_z[k]
             ax += gx
             ay += gy
             az += gz
@@ -171,37 +196,37 @@ def _correct(p, dt):
         own = np.float32(0.0)
         for k in range(np.uint64(p.first[i]), np.uint64(p.first[i + 1])):
             j = p.other[k]
-            a = (u - p.v[j, 0]) * p.slope[k, 0]
-            a += (v - p.v[j, 1]) * p.slope[k, 1]
-            a += (w - p.v[j, 2]) * p.slope[k, 2]
+            a = (u - p.v[j, 0]) * p.slope_x[k]
+            a += (v - p.v[j, 1]) * p.slope_y[k]
+            a += (w - p.v[j, 2]) * p.slope_z[k]
             own += a
             rate[j] += a
         rate[i] += own
     for i in range(n):
-        t = p.total[i, 0] ** 2 + p.total[i, 1] ** 2 + p.total[i, 2] ** 2
-        excess = p.density[i] + dt * rate[i] - np.float32(1.0)
+        t = p.sums[i, 2] ** 2 + p.sums[i, 3] ** 2 + p.sums[i, 4] ** 2
+        excess = p.sums[i, 0] + dt * rate[i] - np.float32(1.0)
         before = p.impulse[i]
-        after = before + np.float32(RELAXATION) * excess / (dt * (t + p.squares[i]) + np.float32(1e-6))
+        after = before + np.float32(RELAXATION) * excess / (dt * (t + p.sums[i, 1]) + np.float32(1e-6))
         p.impulse[i] = max(after, np.float32(0.0))
         p.change[i] = p.impulse[i] - before
 
 
 @part
 def _accelerate(p, dt, gravity, axis, pivot, speed, growth, damping):
-    """Apply gravity, the rotating frame's own accelerations (rad/s, rad/s²) and viscosity."""
+    """Apply gravity, the rotating frame's own accelerations (rad/s, rad/s²), viscosity and the last step's impulses."""
     f = np.float32
     gx, gy, gz = f(gravity[0]), f(gravity[1]), f(gravity[2])
     ax, ay, az = f(axis[0]), f(axis[1]), f(axis[2])
-    w, e, keep, viscosity = f(speed), f(growth), f(1.0 - damping), f(VISCOSITY)
+    w, e, keep = f(speed), f(growth), f(1.0 - damping)
     for i in range(p.count[0]):
         rx, ry, rz = p.x[i, 0] - f(pivot[0]), p.x[i, 1] - f(pivot[1]), p.x[i, 2] - f(pivot[2])
         u, v, s = p.v[i, 0], p.v[i, 1], p.v[i, 2]
         cx, cy, cz = ay * rz - az * ry, az * rx - ax * rz, ax * ry - ay * rx
         ox, oy, oz = ay * cz - az * cy, az * cx - ax * cz, ax * cy - ay * cx
         kx, ky, kz = ay * s - az * v, az * u - ax * s, ax * v - ay * u
-        p.v[i, 0] = keep * (u + dt * (gx - e * cx - w * w * ox - f(2) * w * kx) + viscosity * p.drift[i, 0])
-        p.v[i, 1] = keep * (v + dt * (gy - e * cy - w * w * oy - f(2) * w * ky) + viscosity * p.drift[i, 1])
-        p.v[i, 2] = keep * (s + dt * (gz - e * cz - w * w * oz - f(2) * w * kz) + viscosity * p.drift[i, 2])
+        p.v[i, 0] = keep * (u + dt * (gx - e * cx - w * w * ox - f(2) * w * kx) + p.sums[i, 5])
+        p.v[i, 1] = keep * (v + dt * (gy - e * cy - w * w * oy - f(2) * w * ky) + p.sums[i, 6])
+        p.v[i, 2] = keep * (s + dt * (gz - e * cz - w * w * oz - f(2) * w * kz) + p.sums[i, 7])
 
 
 @part
@@ -266,13 +291,14 @@ def step(p, walls, dt, iterations, gravity, axis, pivot, speed, growth, damping)
     """
     dt = np.float32(dt)
     _sort(p, walls)
-    if not _measure(p, walls):
-        return False
-    _accelerate(p, dt, gravity, axis, pivot, speed, growth, damping)
     for i in range(p.count[0]):
         p.impulse[i] *= np.float32(WARM)
         p.change[i] = p.impulse[i]
-    _push(p)
+    if not _find(p, walls):
+        return False
+    _slopes(p, walls)
+    _sum(p, walls)
+    _accelerate(p, dt, gravity, axis, pivot, speed, growth, damping)
     for _ in range(iterations):
         _correct(p, dt)
         _push(p)
@@ -291,8 +317,8 @@ def density_error(p, walls):
     """
     total, count = 0.0, 0
     for i in range(p.count[0]):
-        open_side = (p.total[i, 0] ** 2 + p.total[i, 1] ** 2 + p.total[i, 2] ** 2) * walls.spacing**2
-        if open_side < 0.04 and p.density[i] > 0.75:
-            total += abs(p.density[i] - 1.0)
+        open_side = (p.sums[i, 2] ** 2 + p.sums[i, 3] ** 2 + p.sums[i, 4] ** 2) * walls.spacing**2
+        if open_side < 0.04 and p.sums[i, 0] > 0.75:
+            total += abs(p.sums[i, 0] - 1.0)
             count += 1
     return total, count

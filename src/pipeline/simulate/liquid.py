@@ -6,7 +6,18 @@
 
 from pipeline.simulate.filling import Filling, fill
 from pipeline.simulate.pouring import Pour, pour
-from pipeline.simulate.rest import holds, particles_for, settle
+from pipeline.simulate.rest import holds, particles_for, settle, settle_all
 from pipeline.simulate.walls import Vessel, vessel
 
-__all__ = ["Filling", "Pour", "Vessel", "fill", "holds", "particles_for", "pour", "settle", "vessel"]
+__all__ = [
+    "Filling",
+    "Pour",
+    "Vessel",
+    "fill",
+    "holds",
+    "particles_for",
+    "pour",
+    "settle",
+    "settle_all",
+    "vessel",
+]

@@ -14,8 +14,9 @@ class Particles(NamedTuple):
 
     x, v (N, 3) in m and m/s; impulse (N,), the pressure's. gone_*: those that left in the last step, the first `count[1]`,
     `gone_how` as in `kernels`. spare_*: room for sorting; bin_of (N,), bin_start (cells + 2,): the sorting. first (N + 1,),
-    other, slope (pairs, 3): the pairs of particle i are first[i] to first[i + 1]. density (N,), its gradient `total` and the
-    wall's part of that, `wall` (N, 3); squares (N,): of the pairs' slopes; drift (N, 3): of the neighbours; change (N,).
+    other (pairs,): the pairs of particle i are first[i] to first[i + 1]; their weight and slope_* (pairs,): kernel and gradient.
+    sums (N, 8): density, the sum of the slopes' squares, the density's gradient (3), the change of velocity (3). wall (N, 3): the
+    wall's part of that gradient. change (N,): of the impulse.
     """
 
     x: np.ndarray
@@ -32,23 +33,24 @@ class Particles(NamedTuple):
     bin_start: np.ndarray
     first: np.ndarray
     other: np.ndarray
-    slope: np.ndarray
-    density: np.ndarray
-    total: np.ndarray
-    squares: np.ndarray
+    weight: np.ndarray
+    slope_x: np.ndarray
+    slope_y: np.ndarray
+    slope_z: np.ndarray
+    sums: np.ndarray
     wall: np.ndarray
-    drift: np.ndarray
     change: np.ndarray
 
 
 def particles(capacity: int, walls: Walls) -> Particles:
     """Make room for `capacity` particles in a container; none is there yet."""
     n, f, i = max(capacity, 1), np.float32, np.int64
+    pairs = n * MAX_PAIRS
     return Particles(
         np.zeros((n, 3), f), np.zeros((n, 3), f), np.zeros(n, f), np.zeros(2, i),
         np.zeros((n, 3), f), np.zeros((n, 3), f), np.zeros(n, i),
         np.zeros((n, 3), f), np.zeros((n, 3), f), np.zeros(n, f),
         np.zeros(n, i), np.zeros(int(np.prod(walls.bins)) + 2, i), np.zeros(n + 1, i),
-        np.zeros(n * MAX_PAIRS, np.uint32), np.zeros((n * MAX_PAIRS, 3), f),
-        np.zeros(n, f), np.zeros((n, 3), f), np.zeros(n, f), np.zeros((n, 3), f), np.zeros((n, 3), f), np.zeros(n, f),
+        np.zeros(pairs, np.uint32), np.zeros(pairs, f), np.zeros(pairs, f), np.zeros(pairs, f), np.zeros(pairs, f),
+        np.zeros((n, 8), f), np.zeros((n, 3), f), np.zeros(n, f),
     )  # fmt: skip

@@ -4,6 +4,8 @@ Settled states are made once a level (levels 10 % apart) and shared: a trial tak
 particles, takes away those at the top and lets the rest settle for a moment (`HOLD_S`) before it moves.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from pipeline.simulate.compiled import compiled
@@ -20,11 +22,12 @@ HOLD_S = 0.1
 BRIMFUL, TOPPED = 0, -1  # keys among the settled states
 _LEVELS = 1.1
 _TOP_UP_FROM = 0.93  # of the capacity: a lattice that settles above this splashes over
+_ROOMS = (5, 10, 15, 20) * 2  # particles of 500 that are missing to the capacity before a trial top-up
+_OF = 500
 _TOP_UPS = 3
-_ROOM, _ROOM_SHARE = 10, 0.02  # between two top-ups: particles, or a share of the capacity
 _PORTIONS = 300  # a portion set down at once is this part of the capacity, one particle at least
-_PORTION_S = 0.08
-_SHAKES = 6
+_PORTION_S = 0.2
+_SHAKES, _CALM_SHAKES = 20, 4  # at most; in a row without a loss
 _CALM_S = 0.4  # what would run over sooner or later has done so then
 _INNER = 0.6  # of the opening's radius
 _ABOVE = 0.8  # spacings from a particle on the surface to one set down on it
@@ -46,9 +49,7 @@ def settle(vessel: Vessel, n: int, seed: int | tuple[int, ...]) -> np.ndarray:
 
     Fewer come back when the vessel does not hold as many: what is missing ran over.
     """
-    level = 8
-    while level < n:
-        level = int(np.ceil(level * _LEVELS))
+    level = next(level for level in _levels() if level >= n)
     at_rest = _brimful(vessel) if level > holds(vessel) else _settled(vessel, level)
     if len(at_rest) < n:  # a level just below the rim can splash over it while it settles
         at_rest = _brimful(vessel) if n <= holds(vessel) else _topped(vessel)
@@ -56,14 +57,37 @@ def settle(vessel: Vessel, n: int, seed: int | tuple[int, ...]) -> np.ndarray:
     return lowest + np.random.default_rng(seed).normal(0.0, _JITTER * vessel.spacing_m, lowest.shape)
 
 
+def settle_all(vessel: Vessel) -> None:
+    """Make every settled state that `settle` may ask for."""
+    for level in _levels():
+        if level > holds(vessel):
+            break
+        _settled(vessel, level)
+    _topped(vessel)
+
+
+def _levels() -> Iterator[int]:
+    level = 8
+    while True:
+        yield level
+        level = int(np.ceil(level * _LEVELS))
+
+
 def holds(vessel: Vessel) -> int:
     """Return how many particles stay for good when the vessel is filled gently until it overflows."""
     return len(_brimful(vessel))
 
 
-def overflows_at(vessel: Vessel) -> int:
-    """Return how many particles are in the vessel just before the first runs over, when it is filled gently."""
-    return len(_topped(vessel))
+def overflows_at(vessel: Vessel) -> float:
+    """Return how many particles are there just before the first runs over when a trial's liquid is topped up: a mean."""
+    target = particles_for(vessel, vessel.cavity.capacity_m3)
+    missing = [_of(target, room) for room in _ROOMS]
+    starts = [settle(vessel, max(target - room, 1), turn) for turn, room in enumerate(missing)]
+    return float(np.mean([len(_topped_up(vessel, start, 1 + turn)) for turn, start in enumerate(starts)]))
+
+
+def _of(target: int, room: int) -> int:
+    return round(room * max(1.0, target / _OF))
 
 
 def _brimful(vessel: Vessel) -> np.ndarray:
@@ -84,9 +108,9 @@ def _topped(vessel: Vessel) -> np.ndarray:
         while len(_settled(vessel, n)) < n:  # it splashed over
             n = len(vessel.settled[n]) - 1
         states = [_topped_up(vessel, vessel.settled[n], 0)]
-        for turn in range(1, _TOP_UPS + 1):
-            room = max(_ROOM, round(_ROOM_SHARE * target))
-            states.append(_topped_up(vessel, _lowest(states[-1], max(len(states[-1]) - room, 1)), turn))
+        for turn, room in enumerate(_ROOMS[:_TOP_UPS], start=1):
+            left = max(len(states[-1]) - _of(target, room), 1)
+            states.append(_topped_up(vessel, _lowest(states[-1], left), turn))
         vessel.settled[TOPPED] = sorted(states[1:], key=len)[_TOP_UPS // 2]
     return vessel.settled[TOPPED]
 
@@ -117,12 +141,14 @@ def _topped_up(vessel: Vessel, start: np.ndarray, turn: int) -> np.ndarray:
 
 
 def _kept(vessel: Vessel, at_rest: np.ndarray) -> np.ndarray:
-    """Return what stays of a state (m, 3) when nothing damps it and it is shaken a little, as trials do."""
+    """Return what stays of a state (m, 3) when nothing damps it and it is shaken a little, again and again, as trials do."""
+    calm = 0
     for turn in range(_SHAKES):
         n, rng = len(at_rest), np.random.default_rng(turn)
         shaken = at_rest + rng.normal(0.0, _JITTER * vessel.spacing_m, at_rest.shape)
         at_rest = _calmed(vessel, shaken, SETTLE_S, 0.0)
-        if len(at_rest) == n:
+        calm = calm + 1 if len(at_rest) == n else 0
+        if calm == _CALM_SHAKES:
             break
     return at_rest
 

@@ -5,75 +5,20 @@ gives the same rows as running all.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from pipeline.errors import PipelineError
 from pipeline.geometry import frames
-from pipeline.geometry.cavity import Cavity, cavity, retained_volume_m3
 from pipeline.simulate import draws, liquid
 from pipeline.simulate.containers import Containers
-from pipeline.simulate.engines import ENGINES, Engine
+from pipeline.simulate.prepared import Container
 from pipeline.simulate.rest import GRAVITY
 
 Row = dict[str, Any]
 # Nine of ten placements may collide; a trial that needs more draws than this has a geometry that cannot work.
 MAX_ATTEMPTS = 1000
-
-
-@dataclass(frozen=True)
-class Container:
-    """A container ready for trials: its mesh (object frame, metres), its cavity, and how an engine sees both."""
-
-    name: str
-    vertices_m: np.ndarray
-    triangles: np.ndarray
-    vessel: Any
-    engine: Engine
-    _kept_m3: dict[tuple[bytes, float], float] = field(default_factory=dict, repr=False, compare=False)
-
-    @property
-    def cavity(self) -> Cavity:
-        """The room for liquid, object frame."""
-        return self.vessel.cavity
-
-    @property
-    def height_m(self) -> float:
-        """The extent of the whole mesh along z."""
-        return float(np.ptp(self.vertices_m[:, 2]))
-
-    @property
-    def depth_m(self) -> float:
-        """The extent of the cavity along z."""
-        return float(np.count_nonzero(self.cavity.interior.any(axis=(0, 1))) * self.cavity.cell_m)
-
-    @property
-    def particle_m3(self) -> float:
-        """The volume of one particle."""
-        return self.vessel.spacing_m**3
-
-    def kept_m3(self, lip_m: np.ndarray, axis: np.ndarray, tilt_rad: float) -> float:
-        """Return what the cup keeps when tilted slowly about `axis` (object frame); remembered, as lips recur."""
-        key = (lip_m.tobytes(), tilt_rad)
-        if key not in self._kept_m3:
-            self._kept_m3[key] = float(retained_volume_m3(self.cavity, lip_m, axis, tilt_rad))
-        return self._kept_m3[key]
-
-
-def container(
-    name: str,
-    vertices_m: np.ndarray,
-    triangles: np.ndarray,
-    spacing_m: float,
-    engine: Engine = ENGINES["liquid"],
-) -> Container:
-    """Prepare a fused mesh (V, 3), (F, 3) for trials; a `PipelineError` names the object if it cannot hold liquid."""
-    room = cavity(vertices_m, triangles, name=name)
-    return Container(
-        name, vertices_m, triangles, engine.prepare(room, vertices_m, triangles, spacing_m), engine
-    )
 
 
 def pouring_trial(cup: Container, protocol: draws.Pouring, trial: int, seed: int) -> Row:
@@ -102,10 +47,8 @@ class FillingExperiment:
     def __init__(self, second: Container, held: Sequence[Container], protocol: draws.Filling) -> None:
         self.second, self.held, self.protocol = second, tuple(held), protocol
         self._bullet = Containers()
-        self._second_body = self._bullet.add_second(second.vertices_m, second.triangles)
-        self._held_bodies = [
-            self._bullet.add_held(cup.vertices_m, cup.triangles, cup.cavity.opening_m) for cup in self.held
-        ]
+        self._second_body = self._bullet.add_second(*second.coarse)
+        self._held_bodies = [self._bullet.add_held(cup.pieces) for cup in self.held]
 
     def __enter__(self) -> "FillingExperiment":
         return self

@@ -17,20 +17,30 @@ __all__ = ["Vessel", "vessel"]
 LOWERED = 0.75  # spacings: a particle's centre stays that far above what it flows over
 TOLERANCE = 0.005
 _RANGE = (0.25, 1.25)
-_TRIALS = 3
+_TRIALS = 5
 
 
 def vessel(cavity: Cavity, spacing_m: float) -> Vessel:
     """Precompute the wall of a cavity for particles `spacing_m` apart, calibrated by overflow."""
-    area = np.pi * np.hypot(*(cavity.rim_m - cavity.opening_m)[:, :2].T).mean() ** 2
+    layer = np.pi * np.hypot(*(cavity.rim_m - cavity.opening_m)[:, :2].T).mean() ** 2 / spacing_m**2
     tried: list[tuple[float, Vessel]] = []
-    lowered = LOWERED
     for _ in range(_TRIALS):
-        candidate = precompute(cavity, spacing_m, lowered)
+        candidate = precompute(cavity, spacing_m, _next_lowered(tried, layer))
         target = particles_for(candidate, cavity.capacity_m3)
-        excess = overflows_at(candidate) - target
-        tried.append((abs(excess), candidate))
-        if abs(excess) <= TOLERANCE * target:
+        tried.append((overflows_at(candidate) - target, candidate))
+        if abs(tried[-1][0]) <= TOLERANCE * target:
             break
-        lowered = float(np.clip(lowered + excess * spacing_m**2 / area, *_RANGE))
-    return min(tried, key=lambda pair: pair[0])[1]
+    return min(tried, key=lambda pair: abs(pair[0]))[1]
+
+
+def _next_lowered(tried: list[tuple[float, Vessel]], layer: float) -> float:
+    """Return by how much to lower the rim next, from the excess of particles at those tried; a spacing holds one `layer`."""
+    over = [(excess, each.lowered) for excess, each in tried if excess > 0]
+    under = [(excess, each.lowered) for excess, each in tried if excess <= 0]
+    if over and under:  # regula falsi between the nearest two
+        (a, low), (b, high) = min(over), max(under)
+        return float(low + (high - low) * a / (a - b))
+    if not tried:
+        return LOWERED
+    excess, each = tried[-1]
+    return float(np.clip(each.lowered + excess / layer, *_RANGE))
