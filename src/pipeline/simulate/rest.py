@@ -22,8 +22,9 @@ HOLD_S = 0.1
 BRIMFUL, TOPPED = 0, -1  # keys among the settled states
 _LEVELS = 1.1
 _TOP_UP_FROM = 0.93  # of the capacity: a lattice that settles above this splashes over
-_ROOMS = (5, 10, 15, 20) * 2  # particles of 500 that are missing to the capacity before a trial top-up
+_ROOMS = (5, 10, 15, 20)  # particles of 500 that are missing to the capacity before a trial top-up
 _OF = 500
+_TWICE_BELOW = 1000  # particles in all: there one counts for more
 _TOP_UPS = 3
 _PORTIONS = 300  # a portion set down at once is this part of the capacity, one particle at least
 _PORTION_S = 0.2
@@ -81,7 +82,7 @@ def holds(vessel: Vessel) -> int:
 def overflows_at(vessel: Vessel) -> float:
     """Return how many particles are there just before the first runs over when a trial's liquid is topped up: a mean."""
     target = particles_for(vessel, vessel.cavity.capacity_m3)
-    missing = [_of(target, room) for room in _ROOMS]
+    missing = [_of(target, room) for room in _ROOMS * (2 if target < _TWICE_BELOW else 1)]
     starts = [settle(vessel, max(target - room, 1), turn) for turn, room in enumerate(missing)]
     return float(np.mean([len(_topped_up(vessel, start, 1 + turn)) for turn, start in enumerate(starts)]))
 
