@@ -46,6 +46,9 @@ def _options() -> argparse.Namespace:
         experiment.add_argument(
             "--engine", default="liquid", help="what is poured: liquid, bullet or bullet_fluid"
         )
+        experiment.add_argument(
+            "--device", default="cpu", choices=("cpu", "cuda"), help="what the liquid is computed on"
+        )
         experiment.add_argument("--seed", type=int, default=4, help="of the whole experiment")
         experiment.add_argument("--trials", type=int, default=1000, help="number of trials")
     pouring.add_argument("--fill-min", type=float, default=0.05, help="least fill, share of the capacity")
@@ -83,21 +86,25 @@ def _prepare(options: argparse.Namespace) -> None:
 
 
 def _pouring(options: argparse.Namespace) -> list[dict]:
-    from pipeline.simulate import draws, engines, prepared, trials
+    from pipeline.simulate import batches, draws, engines, prepared, trials
 
-    engine = engines.engine(options.engine)
+    engine, card = engines.engine(options.engine), batches.card(options.device, options.engine)
     protocol = draws.Pouring(
         options.fill_min, options.fill_max, float(np.radians(options.tilt_max_deg)), options.threshold
     )
     cup = prepared.from_arrays(options.object, artefacts.read_arrays(options.container), engine)
     numbers = command.progress(range(options.trials), options.trials, f"pouring {options.object}")
+    if card:
+        return batches.pourings(
+            card, (trials.pouring(cup, protocol, number, options.seed) for number in numbers)
+        )
     return [trials.pouring_trial(cup, protocol, number, options.seed) for number in numbers]
 
 
 def _filling(options: argparse.Namespace) -> list[dict]:
-    from pipeline.simulate import draws, engines, prepared, trials
+    from pipeline.simulate import batches, draws, engines, prepared, trials
 
-    engine = engines.engine(options.engine)
+    engine, card = engines.engine(options.engine), batches.card(options.device, options.engine)
     protocol = draws.Filling(
         held_particles=options.held_particles,
         tilt_rad=float(np.radians(options.tilt_deg)),
@@ -113,6 +120,8 @@ def _filling(options: argparse.Namespace) -> list[dict]:
     ]
     numbers = command.progress(range(options.trials), options.trials, f"filling {options.object}")
     with trials.FillingExperiment(second, held, protocol) as experiment:
+        if card:
+            return batches.fillings(card, (experiment.filling(number, options.seed) for number in numbers))
         return [experiment.trial(number, options.seed) for number in numbers]
 
 

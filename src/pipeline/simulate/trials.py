@@ -4,7 +4,7 @@ Paper, Section IV-A. A trial is a pure function of (geometry, protocol, trial nu
 gives the same rows as running all.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Generator, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,16 +17,33 @@ from pipeline.simulate.prepared import Container
 from pipeline.simulate.rest import GRAVITY
 
 Row = dict[str, Any]
+# A trial under way: it asks for a simulation by the arguments of an engine's `pour` or `fill`, is sent the result, returns its row.
+Trial = Generator[tuple[Any, ...], Any, Row]
 # Nine of ten placements may collide; a trial that needs more draws than this has a geometry that cannot work.
 MAX_ATTEMPTS = 1000
 
 
+def alone(trial: Trial, simulate: Callable[..., Any]) -> Row:
+    """Run a trial to its end by `simulate`; return its row."""
+    result = None
+    try:
+        while True:
+            result = simulate(*trial.send(result))
+    except StopIteration as end:
+        return end.value
+
+
 def pouring_trial(cup: Container, protocol: draws.Pouring, trial: int, seed: int) -> Row:
     """Run one pouring trial of a cup alone; return its row of the table "trials"."""
+    return alone(pouring(cup, protocol, trial, seed), cup.engine.pour)
+
+
+def pouring(cup: Container, protocol: draws.Pouring, trial: int, seed: int) -> Trial:
+    """Begin one pouring trial of a cup alone."""
     own_seed = draws.trial_seed(seed, "pouring", cup.name, trial)
     draw = draws.draw_pouring(cup.cavity, protocol, draws.stream(own_seed, 0))
     n = cup.engine.particles_for(cup.vessel, draw.fill_m3)
-    pour = cup.engine.pour(cup.vessel, n, draw.lip_m, draw.axis, draw.tilt_rad, own_seed)
+    pour = yield cup.vessel, n, draw.lip_m, draw.axis, draw.tilt_rad, own_seed
     kept_m3 = cup.kept_m3(draw.lip_m, draw.axis, draw.tilt_rad)
     return {
         **_identity(trial, own_seed, "pouring", cup.name, cup.name, "capacity"),
@@ -57,7 +74,11 @@ class FillingExperiment:
         self._bullet.close()
 
     def trial(self, trial: int, seed: int) -> Row:
-        """Run one filling trial; return its row of the table "trials".
+        """Run one filling trial; return its row of the table "trials"."""
+        return alone(self.filling(trial, seed), self.second.engine.fill)
+
+    def filling(self, trial: int, seed: int) -> Trial:
+        """Begin one filling trial.
 
         A contact between the containers on the way, or liquid over a rim before the tilt, voids a draw: it is repeated
         with the same held cup and counted.
@@ -70,7 +91,7 @@ class FillingExperiment:
             if self.touches(draw, number):
                 n_contacts += 1
                 continue
-            filling = self.simulate(draw, number, own_seed)
+            filling = yield self._call(draw, number, own_seed)
             if filling.failed or not filling.spilled_while_settling:
                 return self._row(trial, own_seed, draw, self.held[number], filling, n_void)
         raise PipelineError(
@@ -100,7 +121,10 @@ class FillingExperiment:
 
     def simulate(self, draw: draws.FillingDraw, number: int, seed: int) -> liquid.Filling:
         """Let the liquid flow from held cup `number` as drawn."""
-        return self.second.engine.fill(
+        return self.second.engine.fill(*self._call(draw, number, seed))
+
+    def _call(self, draw: draws.FillingDraw, number: int, seed: int) -> tuple[Any, ...]:
+        return (
             self.held[number].vessel,
             self.second.vessel,
             draw.T_world_held,
