@@ -43,7 +43,7 @@ rule simulate_pouring:
         "benchmarks/simulate/pouring/{object}.tsv"
     threads: 1
     params:
-        shared=options("simulate", "engine", "seed"),
+        shared=options("simulate", "engine", "device", "seed"),
         options=options("simulate.pouring", "trials", "fill_min", "fill_max", "tilt_max_deg", "threshold"),
         code=code("pipeline.simulate"),
     shell:
@@ -65,7 +65,7 @@ rule simulate_filling:
     params:
         # The order of the cups decides which one a trial draws.
         held=" ".join(f"{name}={PROCESSED}/simulate/containers/{name}.npz" for name in HELD),
-        shared=options("simulate", "engine", "seed"),
+        shared=options("simulate", "engine", "device", "seed"),
         options=options(
             "simulate.filling",
             "trials",

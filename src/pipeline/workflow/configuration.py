@@ -121,6 +121,11 @@ def _check_pairs(config: dict) -> None:
         _below(
             "classify.samples", config["classify"]["samples"], f"simulate.{name}.trials", section["trials"]
         )
+    if simulate["device"] == "cuda" and simulate["engine"] != "liquid":
+        raise PipelineError(
+            f"simulate.device: expected cpu with simulate.engine {simulate['engine']}, found cuda, which computes the "
+            "liquid alone; set it to cpu"
+        )
     _below("simulate.pouring.fill_min", pouring["fill_min"], "fill_max", pouring["fill_max"])
     _below("simulate.filling.height_min", filling["height_min"], "height_max", filling["height_max"])
     voxel_m, truncation_m = config["fuse"]["voxel_m"], config["fuse"]["truncation_m"]
