@@ -182,9 +182,12 @@ def test_the_simulated_card_pours_and_fills_as_the_core(tmp_path):
 def test_a_cards_machine_code_can_be_made_without_one(monkeypatch, what):
     """For an H100 (sm_90), by libnvvm and nvjitlink."""
     cuda = _numba_cuda()
-    pytest.importorskip("cuda.bindings.nvvm", reason="no libnvvm")
+    nvjitlink = pytest.importorskip("cuda.bindings.nvjitlink", reason="no nvjitlink")
     import numba
-    from cuda.bindings import nvjitlink
+    from numba.cuda.cudadrv import nvvm
+
+    if not nvvm.is_available():
+        pytest.skip("no libnvvm")
 
     from pipeline.simulate import device
 
@@ -209,8 +212,9 @@ def test_a_cards_machine_code_can_be_made_without_one(monkeypatch, what):
         batches.fill_many(Core(), some_fillings(cup, cup, 3))
     assert ".entry" in made["ptx"]
     assert made["bytes"] > 100_000
-    # A failed trial is known by its not being a number: no comparison may be turned round, no number be flushed.
-    assert ".ftz" not in made["ptx"]
+    assert (
+        "sqrt.rn" in made["ptx"]
+    )  # as exact as a core's: the fast mathematics that the functions ask for is not all taken
 
 
 def test_a_card_agrees_with_the_core(cylinder, bowl):
@@ -225,6 +229,7 @@ def test_a_card_agrees_with_the_core(cylinder, bowl):
     shares = [abs(a.n_left - b.n_left) / b.n_particles for a, b in zip(found, expected, strict=True)]
     assert np.mean(shares) < 0.01
     assert not any(pour.failed or pour.n_leaked for pour in found)
+    assert batches.pour_many(card, [(*calls[0][:3], np.array([0.0, np.nan, 0.0]), *calls[0][4:])])[0].failed
     again = batches.pour_many(card, calls[::-1])[::-1]
     for one, other in zip(found, again, strict=True):
         assert_same(one, other)

@@ -6,12 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 import trimesh
+from simulate.test_batches import Core
 
 from pipeline import artefacts
 from pipeline.errors import PipelineError
 from pipeline.geometry import frames
 from pipeline.simulate import __main__ as command_line
-from pipeline.simulate import draws, prepared, trials
+from pipeline.simulate import batches, draws, prepared, trials
 
 SPACING_M = 0.010
 HALF_FULL = draws.Pouring(fill_min=0.5, fill_max=0.5, tilt_max_rad=np.radians(120.0), threshold=1)
@@ -208,7 +209,8 @@ def test_a_block_is_refused_by_name():
         prepared.container("block", np.array(block.vertices), np.array(block.faces), SPACING_M)
 
 
-def test_the_command_line_runs_both_experiments_twice_to_the_same_bytes(tmp_path, monkeypatch):
+def test_the_command_line_runs_both_experiments_thrice_to_the_same_bytes(tmp_path, monkeypatch):
+    """Alone, again, and many at once: then a core plays the card."""
     cup = prepare("cup", lathe(INNER_M, DEPTH_M), tmp_path)
     bowl = prepare("bowl", lathe(0.060, 0.045), tmp_path)
 
@@ -223,6 +225,10 @@ def test_the_command_line_runs_both_experiments_twice_to_the_same_bytes(tmp_path
     fill = ["filling", "--object", "bowl", "--container", bowl, "--held", f"cup={cup}", f"bowl={bowl}"]
     assert run("p1.parquet", *pour) == run("p2.parquet", *pour)
     assert run("f1.parquet", *fill) == run("f2.parquet", *fill)
+    monkeypatch.setattr(batches, "card", lambda device, engine: Core() if device == "cuda" else None)
+    monkeypatch.setattr(batches, "AT_ONCE", 8)
+    assert run("p1.parquet", *pour) == run("p3.parquet", *pour, "--device", "cuda")
+    assert run("f1.parquet", *fill) == run("f3.parquet", *fill, "--device", "cuda")
     rows = artefacts.read_table(tmp_path / "f1.parquet", "trials")
     assert rows.trial.tolist() == list(range(20))
     assert set(rows.held_object) == {"cup", "bowl"}

@@ -63,6 +63,17 @@ def test_no_other_type_passes_for_a_number(value):
         check(config, SCHEMA)
 
 
+def test_a_card_is_for_the_liquid_alone():
+    config = _config()
+    config["simulate"]["device"] = "cuda"
+    check(config, SCHEMA)
+    config["simulate"]["engine"] = "bullet"
+    with pytest.raises(
+        PipelineError, match=r"^simulate\.device: expected cpu with simulate\.engine bullet, found cuda"
+    ):
+        check(config, SCHEMA)
+
+
 def test_nearest_proposes_only_what_is_near():
     assert nearest("voxl_m", ["voxel_m", "points"]) == " (did you mean 'voxel_m'?)"
     assert nearest("abc", ["voxel_m", "points"]) == ""

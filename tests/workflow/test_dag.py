@@ -91,6 +91,7 @@ def test_one_core_gives_the_same_bytes_as_two(finished, unfinished):
         ("simulate.seed", 40, SIMULATED),
         ("simulate.spacing_m", 0.015, CONTAINED),
         ("simulate.engine", "bullet", SIMULATED),
+        ("simulate.device", "cuda", SIMULATED),
         ("simulate.physics.convergence_trials", 3, set()),
         ("simulate.pouring.tilt_max_deg", 90.0, _each("simulate_pouring") | {"classify pouring", "report"}),
         ("simulate.filling.tilt_deg", 90.0, _each("simulate_filling") | {"classify filling", "report"}),
