@@ -11,13 +11,15 @@ import sys
 import time
 from collections.abc import Callable
 
+import card
 import numpy as np
 import pybullet
 import trimesh
 
+from pipeline import command
 from pipeline.geometry.cavity import Cavity, cavity, lip_alone, pour_axis
 from pipeline.geometry.frames import rotation_about, tilted
-from pipeline.simulate import liquid
+from pipeline.simulate import batches, liquid
 from pipeline.simulate.fields import precompute
 from pipeline.simulate.pouring import HOLD_S
 from pipeline.simulate.rest import STEP_PER_SPACING
@@ -31,6 +33,7 @@ BULLET_HZ = 240
 TABLE = ((0.010, 155), (0.008, 310), (0.0063, 620), (0.005, 1240), (0.004, 2450), (0.0032, 5000))
 SECONDS = 6.0  # of each measurement of throughput
 SEEDS = 3
+CARD_TRIALS = 16384  # of each kind
 
 
 def cup_mesh() -> tuple[np.ndarray, np.ndarray]:
@@ -53,15 +56,13 @@ def pour(vessel: liquid.Vessel, n: int, tilt_rad: float, seed: int) -> liquid.Po
     return liquid.pour(vessel, n, lip, axis, tilt_rad, seed, wait_s=WAIT_S, patient=True)
 
 
-def fill(vessel: liquid.Vessel, seed: int) -> liquid.Filling:
-    """Pour ten particles into a second such cup, half full, the lip 20 mm before its centre and 40 mm above it."""
+def filling(vessel: liquid.Vessel, seed: int) -> batches.Call:
+    """Ask for ten particles poured into a second such cup, half full, the lip 20 mm before its centre and 40 mm above it."""
     lip = lip_alone(vessel.cavity)
     T_world_held, T_world_second = np.eye(4), np.eye(4)
     T_world_held[:3, 3] = vessel.cavity.opening_m + [-0.02, 0.0, 0.04] - lip
     axis = pour_axis(vessel.cavity.opening_m, lip)
-    return liquid.fill(
-        vessel, vessel, T_world_held, T_world_second, lip, axis, np.radians(120.0), 10, 200, seed
-    )
+    return vessel, vessel, T_world_held, T_world_second, lip, axis, np.radians(120.0), 10, 200, seed
 
 
 def bullet_pour(n: int, tilt_rad: float) -> int:
@@ -185,7 +186,7 @@ def measure(rounds: int) -> dict[str, object]:
     ours, finer, filling = milliseconds(
         lambda: pour(vessels[155], 155, TILT_RAD, 1),
         lambda: pour(vessels[310], 310, TILT_RAD, 1),
-        lambda: fill(vessels[155], 1),
+        lambda: liquid.fill(*filling(vessels[155], 1)),
         rounds=5 * rounds,
     )
     beside, bullet = milliseconds(
@@ -207,16 +208,29 @@ def measure(rounds: int) -> dict[str, object]:
     }
 
 
+def on_a_card() -> dict[str, float]:
+    """Return what a card does beside one core: pours of 155 particles by tilts from 0 to 120°, and fillings."""
+    vessel = liquid.vessel(cup(), SPACING_M[155])
+    tilts = np.random.default_rng(1).uniform(0.0, np.radians(120.0), CARD_TRIALS)
+    lip = lip_alone(vessel.cavity)
+    axis = pour_axis(vessel.cavity.opening_m, lip)
+    pours = [(vessel, 155, lip, axis, tilt_rad, seed) for seed, tilt_rad in enumerate(tilts)]
+    return card.measure(pours, [filling(vessel, seed) for seed in range(CARD_TRIALS)])
+
+
 def main() -> None:
     """Measure, and write what was found to standard output."""
     parser = argparse.ArgumentParser(description=__doc__, allow_abbrev=False)
     parser.add_argument("--json", action="store_true", help="write JSON instead of lines")
+    parser.add_argument(
+        "--device", choices=("cpu", "cuda"), default="cpu", help="cuda: a card beside one core"
+    )
     parser.add_argument("--rounds", type=int, default=5, help="rounds of each comparison")
     options = parser.parse_args()
-    found = measure(options.rounds)
+    found = measure(options.rounds) if options.device == "cpu" else on_a_card()
     lines = json.dumps(found, indent=2) if options.json else "\n".join(f"{k}: {v}" for k, v in found.items())
     sys.stdout.write(lines + "\n")
 
 
 if __name__ == "__main__":
-    main()
+    command.run(main)
