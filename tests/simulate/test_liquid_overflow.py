@@ -31,13 +31,13 @@ def taken_before_it_overflows(vessel: Vessel, room: int, seed: int, most: int = 
 def test_filled_gently_it_overflows_when_its_free_room_is_taken(
     request: pytest.FixtureRequest, name: str
 ) -> None:
-    """The calibration is one of the mean; within half a layer the particles' own order decides: ten of 400 are 2.5 %."""
+    """The calibration is one of the mean, and of the particles at hand: other roundings order them otherwise near the brim."""
     vessel = request.getfixturevalue(name)
     excess = [
         np.mean([taken_before_it_overflows(vessel, room, seed) for seed in SEEDS]) - room for room in ROOMS
     ]
-    assert np.mean(excess) == pytest.approx(0.0, abs=3)
-    assert np.abs(excess).max() < 0.025 * liquid.holds(vessel)
+    assert abs(np.mean(excess)) < 0.015 * liquid.holds(vessel)
+    assert np.abs(excess).max() < 0.04 * liquid.holds(vessel)
 
 
 @pytest.mark.parametrize(("room", "least", "most"), [pytest.param(0, 5, 30, marks=TOO_MUCH), (40, 0, 0)])
