@@ -17,7 +17,7 @@ from pipeline.scan import truth
 from pipeline.scan.shapes import RIM_M, lip_distance
 
 MEASURED = ("mug", "wide_bowl", "jug")
-OPTIONS = {"voxel_m": 0.001, "truncation_m": 0.002, "n_points": 6000, "seed": 2}
+OPTIONS = {"voxel_m": 0.00125, "truncation_m": 0.0025, "n_points": 6000, "seed": 2}
 
 
 def scene_of(vertices: np.ndarray, triangles: np.ndarray) -> o3d.t.geometry.RaycastingScene:
