@@ -8,6 +8,7 @@ import numba
 import numpy as np
 
 LEAST_FREE = 2  # views that see a voxel free, far from every surface: enough to believe it
+SURELY_FREE = 12  # views that see past, and none before them that sees a surface: the others are not asked
 # A view that sees past a voxel counts less than one that sees the surface near it: at a lip, where half of the views see past,
 # the mean is then zero in walls of some millimetres.
 FREE_WORTH = 0.4
@@ -70,7 +71,7 @@ def _observed(x, y, z, plane, view, projection, truncation, enough, seen):  # ty
         distance = plane[row, 0] * x + plane[row, 1] * y + plane[row, 2] * z - plane[row, 3]
         if distance >= min(truncation, PAST_M * plane[row, 4]):
             free += 1
-            if free >= enough:
+            if free >= enough or (free >= SURELY_FREE and count == 0):
                 break
         elif distance > -truncation:
             # Across the ray a pixel is as uncertain as ever, along it by the tangent of the incidence more.
@@ -83,40 +84,50 @@ def _observed(x, y, z, plane, view, projection, truncation, enough, seen):  # ty
 @numba.njit(cache=True)
 def _nearest_side(seen, free, truncation):  # type: ignore[no-untyped-def]
     """Return the mean distance; where two opposite sides are seen that of the nearer: solid is what is behind both."""
-    if len(seen) == 0:
-        return truncation
-    axis = _main_axis(seen)
-    total, weight, normal = np.zeros(2), np.zeros(2), np.zeros((2, 3))
-    for distance, w, nx, ny, nz in seen:
-        side = 0 if axis[0] * nx + axis[1] * ny + axis[2] * nz > 0 else 1
-        total[side] += w * distance
-        weight[side] += w
-        normal[side, 0] += w * nx
-        normal[side, 1] += w * ny
-        normal[side, 2] += w * nz
-    cosine = (normal[0] * normal[1]).sum()
-    lengths = np.sqrt((normal[0] ** 2).sum() * (normal[1] ** 2).sum())
-    if lengths == 0 or cosine > OPPOSED_COSINE * lengths:
-        return (total.sum() + free * truncation) / (weight.sum() + free)
-    sides = (total + free * truncation) / (weight + free)
-    return max(sides[0], sides[1])
+    total, weight, one_side = free * truncation, free, True
+    for i in range(len(seen)):
+        total += seen[i, 1] * seen[i, 0]
+        weight += seen[i, 1]
+        one_side &= seen[0, 2] * seen[i, 2] + seen[0, 3] * seen[i, 3] + seen[0, 4] * seen[i, 4] > 0
+    if one_side:
+        return total / weight
+    first, first_weight, cosine = _one_side(seen, _main_axis(seen))
+    second, second_weight = total - free * truncation - first, weight - free - first_weight
+    if cosine > OPPOSED_COSINE:
+        return total / weight
+    first, second = first + free * truncation, second + free * truncation
+    return max(first / (first_weight + free), second / (second_weight + free))
+
+
+@numba.njit(cache=True)
+def _one_side(seen, axis):  # type: ignore[no-untyped-def]
+    """Return the weighted sum of distances along the axis (3,) and their weight, and the cosine between the two sides' normals."""
+    total, weight = 0.0, 0.0
+    normals = np.zeros((2, 3))
+    for i in range(len(seen)):
+        along = axis[0] * seen[i, 2] + axis[1] * seen[i, 3] + axis[2] * seen[i, 4] > 0
+        if along:
+            total += seen[i, 1] * seen[i, 0]
+            weight += seen[i, 1]
+        for j in range(3):
+            normals[int(along), j] += seen[i, 1] * seen[i, 2 + j]
+    lengths = np.sqrt((normals[0] ** 2).sum() * (normals[1] ** 2).sum())
+    return total, weight, (normals[0] * normals[1]).sum() / lengths if lengths > 0 else 1.0
 
 
 @numba.njit(cache=True)
 def _main_axis(seen):  # type: ignore[no-untyped-def]
     """Return the main axis (3,) of the normals, whatever their signs, by power iteration."""
     scatter = np.zeros((3, 3))
-    for row in seen:
+    for k in range(len(seen)):
         for i in range(3):
             for j in range(3):
-                scatter[i, j] += row[1] * row[2 + i] * row[2 + j]
-    axis = scatter[np.argmax(np.diag(scatter))].copy()
+                scatter[i, j] += seen[k, 1] * seen[k, 2 + i] * seen[k, 2 + j]
+    axis, turned = scatter[np.argmax(np.diag(scatter))].copy(), np.zeros(3)
     for _ in range(4):
-        turned = np.zeros(3)
         for i in range(3):
-            for j in range(3):
-                turned[i] += scatter[i, j] * axis[j]
-        axis = turned / max(np.sqrt((turned**2).sum()), 1e-300)
+            turned[i] = scatter[i, 0] * axis[0] + scatter[i, 1] * axis[1] + scatter[i, 2] * axis[2]
+        axis[:] = turned / max(np.sqrt((turned**2).sum()), 1e-300)
     return axis
 
 

@@ -7,7 +7,7 @@ from pipeline.fuse.cloud import vertex_normals
 from pipeline.fuse.measuring import offsets, outlines
 from pipeline.fuse.planes import Planes
 
-ROUNDS = 3
+ROUNDS = 2
 REACH_M = 0.003  # pixels further off show something else
 # The shift of a vertex counts as much as this weight of pixels when it is its neighbours' mean.
 STIFFNESS, SWEEPS = 1.0, 30
@@ -22,7 +22,7 @@ FLOOR_M = 0.0003  # the least height of what is above the table
 def refined(
     vertices_m: np.ndarray, triangles: np.ndarray, base: np.ndarray, excess_m: np.ndarray, seen_by: Planes
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return vertices (V, 3) drawn to the planes that face them, and with what weight they were seen (V,).
+    """Return vertices (V, 3) drawn to the planes that face them, and the sum of the cosines (V,) under which they were seen.
 
     vertices_m, triangles: closed, object frame, too thick by `excess_m` (V,) at each vertex. base (V,): what stands on the
     table, which stays at its height. What was not seen follows its neighbours.
@@ -33,31 +33,31 @@ def refined(
     vertices = vertices - excess_m[:, None] * move * vertex_normals(vertices, triangles, _NORMAL_RINGS)
     for _ in range(ROUNDS):
         normals = vertex_normals(vertices, triangles, _NORMAL_RINGS)
-        offset, weight = _measured(vertices, normals, mean, seen_by)
+        offset, weight, seen = _measured(vertices, normals, mean, seen_by)
         weight[base] = 0.0
         step = offset
         for _ in range(SWEEPS):
             step = (weight * offset + STIFFNESS * (mean @ step)) / (weight + STIFFNESS)
         vertices = _smoothed(vertices + step[:, None] * move * normals, mean, move, SMOOTHINGS, TAUBIN)
     vertices[~base, 2] = np.maximum(vertices[~base, 2], FLOOR_M)
-    return vertices, weight
+    return vertices, seen
 
 
 def _measured(
     vertices: np.ndarray, normals: np.ndarray, mean: csr_matrix, seen_by: Planes
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the measured offset (V,) along the normals and its weight (V,)."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the measured offset (V,) along the normals, its weight (V,), and that of pixels that face the vertex (V,)."""
     around = normals
     for _ in range(_EDGE_RINGS):
         around = mean @ around
     edge = np.linalg.norm(around, axis=1) < EDGE_MEAN
     views = seen_by.plane, seen_by.view, seen_by.projection
-    by_planes, weight = offsets(vertices, normals, *views, REACH_M)
+    by_planes, seen = offsets(vertices, normals, *views, REACH_M)
     by_outlines, count = outlines(vertices, normals, edge, *views, seen_by.eye)
-    weight = np.where(edge, EDGE_PLANES, 1.0) * weight
+    weight = np.where(edge, EDGE_PLANES, 1.0) * seen
     total = weight + OUTLINE_WEIGHT * count
     offset = weight * by_planes + OUTLINE_WEIGHT * count * by_outlines
-    return offset / np.maximum(total, 1e-12), total
+    return offset / np.maximum(total, 1e-12), total, seen
 
 
 def _neighbour_mean(triangles: np.ndarray, n: int) -> csr_matrix:

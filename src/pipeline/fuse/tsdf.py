@@ -15,11 +15,13 @@ from pipeline.fuse.table import Placement
 BLOCK = 8
 # The table's own surface, fused, stays below this height: what is lower counts as table.
 TABLE_M = 0.0006
+# Beyond the sensor's noise a longer truncation only makes floor and walls speak of each other (docs/fusion.md).
+LARGEST_TRUNCATION_M = 0.004
 # The field is shifted by so much, so that noise tears no holes into walls of a millimetre; the refinement takes it back.
 EXCESS_VOXELS = 0.8
 EXCESS_RAMP_M = 0.003
 LEAST_VOTES, PRIOR_VOTES, UNSEEN_VOTE = 0.2, 0.5, 0.1
-LEAST_WEIGHT = 0.1  # of the pixels that face a vertex, for it to be seen: one view at 70° from the normal
+LEAST_WEIGHT = 0.3  # of the cosines under which pixels saw a vertex, for it to count as seen: one view at 70°
 _LEAST_VALUE = 0.02  # of the truncation: keeps vertices apart from grid points, so that no triangle is empty
 
 
@@ -49,6 +51,7 @@ def fuse(views: Views, placement: Placement, voxel_m: float, truncation_m: float
         raise PipelineError(
             f"--truncation-m: expected at least two voxels of {voxel_m} m, found {truncation_m}; set fuse.truncation_m"
         )
+    truncation_m = min(truncation_m, max(LARGEST_TRUNCATION_M, 2 * voxel_m))
     lowest, covered = _box(placement, voxel_m)
     seen_by = planes(views, placement)
     value = _field(seen_by, placement.points_m, lowest, covered, voxel_m, truncation_m)
@@ -173,7 +176,7 @@ def regularised(value: np.ndarray, weight: np.ndarray) -> np.ndarray:
 
 
 def enclosed(free: np.ndarray) -> np.ndarray:
-    """Return which free voxels (nx, ny, nz) are walled in on their level: no way to the border in the same layer."""
+    """Return the largest room of free voxels (nx, ny, nz) that are walled in on their level: no way to the border in a layer."""
     level = np.zeros((3, 3, 3), bool)
     level[:, :, 1] = ndimage.generate_binary_structure(2, 1)
     labels, count = ndimage.label(free, level)
@@ -181,7 +184,10 @@ def enclosed(free: np.ndarray) -> np.ndarray:
     for side in (labels[0], labels[-1], labels[:, 0], labels[:, -1]):
         outside[side.ravel()] = True
     outside[0] = True
-    return ~outside[labels]
+    rooms, count = ndimage.label(~outside[labels])
+    sizes = np.bincount(rooms.ravel(), minlength=count + 1)
+    sizes[0] = 0
+    return (rooms == sizes.argmax()) & (count > 0)
 
 
 def touches(
