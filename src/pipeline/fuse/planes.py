@@ -44,8 +44,9 @@ def planes(views: Views, placement: Placement) -> Planes:
     for depth_m, T_object_camera in zip(views.depths_m, poses, strict=True):
         low, high = _window(corners, views.intrinsics, T_object_camera, depth_m.shape)
         K = views.intrinsics - [[0, 0, low[0]], [0, 0, low[1]], [0, 0, 0]]
-        usable = np.where(behind_edge(depth_m), 0, depth_m)[low[1] : high[1], low[0] : high[0]]
-        parts.append(_fitted(np.ascontiguousarray(usable), K, T_object_camera, placement.bounds_m))
+        depth_m = depth_m[low[1] : high[1], low[0] : high[0]]
+        usable = np.where(behind_edge(depth_m), 0, depth_m).astype(np.float32)
+        parts.append(_fitted(usable, K, T_object_camera, placement.bounds_m))
         windows.append((start, *(high - low)))
         projections.append(K @ frames.inverse(T_object_camera)[:3])
         start += len(parts[-1])

@@ -176,18 +176,23 @@ def regularised(value: np.ndarray, weight: np.ndarray) -> np.ndarray:
 
 
 def enclosed(free: np.ndarray) -> np.ndarray:
-    """Return the largest room of free voxels (nx, ny, nz) that are walled in on their level: no way to the border in a layer."""
+    """Return the largest room of free voxels (nx, ny, nz) that are walled in on their level: no way to the border in a layer.
+
+    A pinhole in the wall is no way: ways are at least three voxels wide.
+    """
     level = np.zeros((3, 3, 3), bool)
     level[:, :, 1] = ndimage.generate_binary_structure(2, 1)
-    labels, count = ndimage.label(free, level)
+    wide = ndimage.binary_erosion(free, level, border_value=1)
+    labels, count = ndimage.label(wide, level)
     outside = np.zeros(count + 1, bool)
+    outside[0] = True
     for side in (labels[0], labels[-1], labels[:, 0], labels[:, -1]):
         outside[side.ravel()] = True
-    outside[0] = True
     rooms, count = ndimage.label(~outside[labels])
-    sizes = np.bincount(rooms.ravel(), minlength=count + 1)
-    sizes[0] = 0
-    return (rooms == sizes.argmax()) & (count > 0)
+    if count == 0:
+        return np.zeros_like(free)
+    sizes = np.bincount(rooms.ravel())
+    return ndimage.binary_dilation(rooms == sizes[1:].argmax() + 1, level) & free
 
 
 def touches(
