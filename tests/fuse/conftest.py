@@ -10,7 +10,7 @@ from pipeline.geometry import frames
 from pipeline.scan import recording
 from pipeline.scan.shapes import shape
 
-OPTIONS = {"voxel_m": 0.001, "truncation_m": 0.002, "n_points": 6000, "seed": 2}
+OPTIONS = {"voxel_m": 0.00125, "truncation_m": 0.0025, "n_points": 6000, "seed": 2}
 
 
 @pytest.fixture(scope="session")

@@ -17,7 +17,7 @@ from pipeline.scan import truth
 from pipeline.scan.shapes import RIM_M, lip_distance
 
 MEASURED = ("mug", "wide_bowl", "jug")
-OPTIONS = {"voxel_m": 0.001, "truncation_m": 0.002, "n_points": 6000, "seed": 2}
+OPTIONS = {"voxel_m": 0.00125, "truncation_m": 0.0025, "n_points": 6000, "seed": 2}
 
 
 def scene_of(vertices: np.ndarray, triangles: np.ndarray) -> o3d.t.geometry.RaycastingScene:
@@ -37,9 +37,11 @@ def test_both_sides_of_the_wall_are_where_they_should_be(case):
     error = scene_of(*case.result.mesh).compute_distance(places).numpy()
     standing = (points.z_m < 0.001).to_numpy()
     inner = points.inner.to_numpy()
-    for side in (inner, ~inner & ~standing & ~points.handle.to_numpy(), points.rim.to_numpy()):
+    outer = ~inner & ~standing & ~points.handle.to_numpy()
+    # Below a bowl's curved wall nobody sees anything: there the outside is closed by guess.
+    for side, quantile_m in ((inner, 0.0005), (outer, 0.0015), (points.rim.to_numpy(), 0.001)):
         assert error[side].mean() < 0.0004
-        assert np.quantile(error[side], 0.95) < 0.001
+        assert np.quantile(error[side], 0.95) < quantile_m
     if case.shape.has_handle:
         assert error[points.handle].mean() < 0.0006
 
@@ -78,7 +80,7 @@ def test_cloud_is_uniform_and_its_normals_are_true(case):
         places.astype(np.float32)
     )
     cosine = np.einsum("ij,ij->i", closest["primitive_normals"].numpy(), normals)[cloud.seen]
-    assert np.mean(cosine > np.cos(np.deg2rad(10))) > 0.88
+    assert np.mean(cosine > np.cos(np.deg2rad(10))) > 0.94
     assert np.mean(cosine < 0) < 0.002
 
 

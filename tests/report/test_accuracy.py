@@ -36,7 +36,17 @@ def test_fused_surfaces_are_near_the_true_ones_on_both_sides_of_the_wall(metrics
     for name in NAMES:
         assert metrics[f"fuse.{name}.inner_error_mm_mean"] < 0.6, name
         assert metrics[f"fuse.{name}.outer_error_mm_mean"] < 0.6, name
-    assert metrics["fuse.capacity.relative_error_max"] < 0.03
+        assert metrics[f"fuse.{name}.inner_error_mm_p95"] < 1.5, name
+        assert metrics[f"fuse.{name}.outer_error_mm_p95"] < 1.5, name
+        assert metrics[f"fuse.{name}.wall_error_mm_mean"] < 0.5, name
+    assert metrics["fuse.capacity.relative_error_max"] < 0.02
+
+
+def test_the_cavity_is_seen_and_its_normals_are_true(metrics):
+    assert metrics["fuse.cavity_seen_share_min"] > 0.98
+    assert metrics["fuse.seen_normals_within_10_deg_share"] > 0.95
+    assert metrics["fuse.seen_normals_within_10_deg_share_min"] > 0.90
+    assert metrics["fuse.normals_flipped_share_max"] < 0.001
 
 
 def test_mapped_labels_find_the_parts_that_the_baseline_misses(metrics):

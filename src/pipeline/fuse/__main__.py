@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from pipeline.command import parser, run
+from pipeline.command import parser, run, say
 
 
 def main() -> None:
@@ -14,8 +14,8 @@ def main() -> None:
     options.add_argument("--mesh", type=Path, required=True, help="surface to write, PLY")
     options.add_argument("--cloud", type=Path, required=True, help="points to write, Parquet")
     options.add_argument("--report", type=Path, required=True, help="what was found, JSON")
-    options.add_argument("--voxel-m", type=float, default=0.001, help="edge of a voxel")
-    options.add_argument("--truncation-m", type=float, default=0.002, help="truncation distance")
+    options.add_argument("--voxel-m", type=float, default=0.00125, help="edge of a voxel")
+    options.add_argument("--truncation-m", type=float, default=0.0025, help="truncation distance")
     options.add_argument("--points", type=int, default=12_000, help="points of the cloud, at least 5000")
     options.add_argument("--seed", type=int, default=2)
     o = options.parse_args()
@@ -24,6 +24,8 @@ def main() -> None:
     from pipeline.fuse.fusion import fused
 
     result = fused(o.raw, voxel_m=o.voxel_m, truncation_m=o.truncation_m, n_points=o.points, seed=o.seed)
+    for complaint in result.complaints:
+        say(f"{o.raw}: {complaint}")
     artefacts.write_mesh(o.mesh, result.mesh)
     artefacts.write_table(o.cloud, result.cloud, "cloud")
     artefacts.write_json(o.report, result.report)

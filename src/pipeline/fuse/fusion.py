@@ -1,6 +1,6 @@
 """From a raw folder to the surface, the cloud and the report of what was found."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -9,23 +9,27 @@ import pandas as pd
 
 from pipeline.artefacts import Mesh
 from pipeline.errors import PipelineError
-from pipeline.fuse import dropped, layouts, table, tsdf
+from pipeline.fuse import coverage, dropped, layouts, table, tsdf
 from pipeline.fuse.cloud import cloud
 
 LEAST_POINTS = 5000
 # A surface further than this from half of its own measurements was fused from views that do not fit together.
 LARGEST_RESIDUAL_M = 0.003
 _RESIDUAL_POINTS = 20_000
-_SMOOTH_FUSED, _SMOOTH_DROPPED = 5, 0
+_SMOOTH_FUSED, _SMOOTH_DROPPED = 2, 0
 
 
 @dataclass(frozen=True)
 class Fused:
-    """mesh: vertices (V, 3) and triangles (F, 3), object frame; cloud: table `cloud`; report: content of fusion.json."""
+    """mesh: vertices (V, 3) and triangles (F, 3), object frame; cloud: table `cloud`; report: content of fusion.json.
+
+    complaints: what a user should know of the scan, a sentence each.
+    """
 
     mesh: Mesh
     cloud: pd.DataFrame
     report: dict[str, Any]
+    complaints: tuple[str, ...] = ()
 
 
 def fused(folder: Path, *, voxel_m: float, truncation_m: float, n_points: int, seed: int) -> Fused:
@@ -36,7 +40,8 @@ def fused(folder: Path, *, voxel_m: float, truncation_m: float, n_points: int, s
     raw = layouts.read(folder)
     if isinstance(raw, layouts.DroppedMesh):
         vertices, triangles, T_object_world = dropped.read(raw)
-        surface = tsdf.Surface(vertices, triangles, np.ones(len(vertices), bool))
+        every = np.ones(len(vertices), bool)
+        surface = tsdf.Surface(vertices, triangles, every, ~every)
         return _result(surface, n_points, _SMOOTH_DROPPED, rng, _mesh_facts(T_object_world, raw))
     points = table.world_points(raw)
     eyes = np.array([T[:3, 3] for T in raw.T_world_cameras])
@@ -44,7 +49,11 @@ def fused(folder: Path, *, voxel_m: float, truncation_m: float, n_points: int, s
     placement = table.place(points, plane, str(folder))
     surface = tsdf.fuse(raw, placement, voxel_m, truncation_m, str(folder))
     facts = _scan_facts(raw, plane, placement, surface, str(folder), rng)
-    return _result(surface, n_points, _SMOOTH_FUSED, rng, facts)
+    shares = coverage.shares_seen(surface)
+    facts |= {"seen": shares, "floor_closed_by_table_m2": surface.table_closed_m2}
+    return replace(
+        _result(surface, n_points, _SMOOTH_FUSED, rng, facts), complaints=tuple(coverage.complaints(shares))
+    )
 
 
 def _result(

@@ -1,169 +1,207 @@
-"""Depth images to one closed surface: a truncated signed distance in Open3D's VoxelBlockGrid, and marching cubes."""
+"""Depth images to one closed surface: a truncated signed distance, Open3D's marching cubes, and a refinement of what comes out."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import binary_dilation, gaussian_filter, minimum_filter
+from scipy import ndimage
 
 from pipeline.errors import PipelineError
+from pipeline.fuse import measuring
 from pipeline.fuse.layouts import Views
+from pipeline.fuse.planes import Planes, planes
+from pipeline.fuse.refinement import refined
 from pipeline.fuse.table import Placement
-from pipeline.geometry import frames
 
 BLOCK = 8
-# Depth is smoothed over 5×5 pixels, within 4 mm: three times the noise of a Kinect at 0.6 m.
-SMOOTH_PIXELS, SMOOTH_DEPTH_M, SMOOTH_SIGMA_PX = 5, 0.004, 1.5
-# Pixels this far behind a neighbour are dropped: near an edge the sensor mixes up who is in front, and what is
-# wrongly seen behind a lip would carve the lip away.
-EDGE_JUMP_M = 0.010
 # The table's own surface, fused, stays below this height: what is lower counts as table.
 TABLE_M = 0.0006
-LEAST_VOTES, PRIOR_VOTES, UNSEEN_VOTE = 0.5, 2.0, 0.5
-FREE_STRIDE = 3  # of the views that measure blocks without a surface: whether they are free is soon known
-SMOOTHINGS, TAUBIN = 10, (0.5, -0.53)
+# Beyond the sensor's noise a longer truncation only makes floor and walls speak of each other (docs/fusion.md).
+LARGEST_TRUNCATION_M = 0.004
+# The field is shifted by so much, so that noise tears no holes into walls of a millimetre; the refinement takes it back.
+EXCESS_VOXELS = 0.8
+EXCESS_RAMP_M = 0.003
+LEAST_VOTES, PRIOR_VOTES, UNSEEN_VOTE = 0.2, 0.5, 0.1
+LEAST_WEIGHT = 0.3  # of the cosines under which pixels saw a vertex, for it to count as seen: one view at 70°
 _LEAST_VALUE = 0.02  # of the truncation: keeps vertices apart from grid points, so that no triangle is empty
 
 
 @dataclass(frozen=True)
 class Surface:
-    """vertices_m (V, 3), object frame; triangles (F, 3) oriented outwards; seen (V,): by a camera, not closed by us."""
+    """A closed surface, object frame: vertices_m (V, 3), triangles (F, 3) oriented outwards.
+
+    seen (V,): by a camera, not closed by us. inner (V,): at the cavity, which is every place walled in on its level.
+    table_closed_m2: area of the cavity's floor that is the table.
+    """
 
     vertices_m: np.ndarray
     triangles: np.ndarray
     seen: np.ndarray
+    inner: np.ndarray
+    table_closed_m2: float = 0.0
 
 
 def fuse(views: Views, placement: Placement, voxel_m: float, truncation_m: float, name: str) -> Surface:
     """Fuse the views (Curless & Levoy 1996) in the object frame into a closed surface that stands on z = 0.
 
-    Space that no camera saw free counts as solid, down to the table: this closes the underside and the inside of the
-    wall. The truncation should be less than the walls' thickness, else their two sides eat each other.
+    Space that no camera saw free counts as solid, down to the table: this closes the underside, the inside of the wall and what
+    is merely unseen of the cavity's floor. The two sides of a wall are measured apart, so that the truncation may exceed its
+    thickness.
     """
     if not 0 < voxel_m <= truncation_m / 2:
         raise PipelineError(
             f"--truncation-m: expected at least two voxels of {voxel_m} m, found {truncation_m}; set fuse.truncation_m"
         )
-    grid, keys = _grid(placement, voxel_m)
-    near = _near(keys, placement.points_m, voxel_m)
-    for i, (depth, T_world_camera) in enumerate(zip(views.depths_m, views.T_world_cameras, strict=True)):
-        T_camera_object = frames.inverse(placement.T_object_world @ T_world_camera)
-        blocks = keys if i % FREE_STRIDE == 0 else keys[near]
-        _integrate(grid, blocks, depth, views.intrinsics, T_camera_object, truncation_m / voxel_m)
-    measured, lowest = _close(grid, placement, voxel_m, truncation_m)
-    mesh = grid.extract_triangle_mesh(0.5, -1)
-    if mesh.is_empty() or len(mesh.triangle.indices) == 0:
-        raise PipelineError(
-            f"{name}: expected a surface from {len(views.depths_m)} views, found none; check poses and units"
-        )
-    vertices, triangles = canonical(
-        mesh.vertex.positions.numpy().astype(float), mesh.triangle.indices.numpy()
+    truncation_m = min(truncation_m, max(LARGEST_TRUNCATION_M, 2 * voxel_m))
+    lowest, covered = _box(placement, voxel_m)
+    seen_by = planes(views, placement)
+    value = _field(seen_by, placement.points_m, lowest, covered, voxel_m, truncation_m)
+    heights_m = (lowest[2] + np.arange(value.shape[2])) * voxel_m
+    value -= np.float32(_excess_m(heights_m, voxel_m) / truncation_m)
+    walled_in = enclosed(value > 0)
+    floor = _table_layers(voxel_m) - lowest[2]
+    table_closed_m2 = float(walled_in[:, :, floor].sum()) * voxel_m**2
+    value[:, :, floor][walled_in[:, :, floor]] = -1.0
+    vertices, triangles = _marched(
+        value, lowest, voxel_m, f"{name}: expected a surface from {len(views.depths_m)} views"
     )
-    vertices, triangles = largest_component(vertices, triangles)
-    seen = _seen(vertices, measured, lowest, voxel_m)
+    vertices, triangles = largest_component(*canonical(vertices, triangles))
     base = vertices[:, 2] < _table_layers(voxel_m) * voxel_m
     vertices[base, 2] = 0.0
-    return Surface(smoothed(vertices, triangles, ~base), triangles, seen & ~base)
+    inner = touches(vertices, ~base, walled_in, lowest, voxel_m)
+    vertices, weight = refined(vertices, triangles, base, _excess_m(vertices[:, 2], voxel_m), seen_by)
+    return Surface(vertices, triangles, (weight > LEAST_WEIGHT) & ~base, inner, table_closed_m2)
 
 
-def _grid(placement: Placement, voxel_m: float):  # type: ignore[no-untyped-def]
-    """Return a grid and the keys of all its blocks: above the footprint, and one layer below the table."""
-    import open3d as o3d
+def _excess_m(heights_m: np.ndarray, voxel_m: float) -> np.ndarray:
+    """Return how much too thick the surface is made at these heights: not on the table, which would grow onto the object."""
+    layer_m = _table_layers(voxel_m) * voxel_m
+    return EXCESS_VOXELS * voxel_m * np.clip((heights_m - layer_m) / EXCESS_RAMP_M, 0.0, 1.0)
 
+
+def _field(
+    seen_by: Planes,
+    points_m: np.ndarray,
+    lowest: np.ndarray,
+    covered: np.ndarray,
+    voxel_m: float,
+    truncation_m: float,
+) -> np.ndarray:
+    """Return the signed distance (nx, ny, nz) in truncations: unseen voxels are solid, beyond footprint, top and table is free."""
+    near = _near(points_m, lowest, covered, truncation_m, voxel_m)
+    arrays = seen_by.plane, seen_by.view, seen_by.projection
+    columns = covered.any(axis=2)
+    value, weight = measuring.signed_distances(lowest, voxel_m, columns, near, *arrays, truncation_m)
+    value = regularised(value, weight)
+    value[~covered] = 1.0
+    return value
+
+
+def _box(placement: Placement, voxel_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the first voxel's coordinates (3,) and which voxels (nx, ny, nz) are above the table and the footprint.
+
+    Whole blocks: one layer of them is below the table.
+    """
     edge = voxel_m * BLOCK
     low = np.floor(placement.bounds_m[0] / edge).astype(int) - [0, 0, 1]
-    high = np.floor(placement.bounds_m[1] / edge).astype(int)
-    axes = [np.arange(a, b + 1) for a, b in zip(low, high, strict=True)]
-    keys = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3).astype(np.int32)
-    within = np.arange(BLOCK) * voxel_m
-    x = keys[:, 0, None, None] * edge + within[:, None]
-    y = keys[:, 1, None, None] * edge + within
-    keys = keys[placement.covers(*np.broadcast_arrays(x, y)).any(axis=(1, 2))]
-    real = o3d.core.float32
-    device = o3d.core.Device("CPU:0")
-    grid = o3d.t.geometry.VoxelBlockGrid(
-        ("tsdf", "weight"), (real, real), [o3d.core.SizeVector([1])] * 2, voxel_m, BLOCK, len(keys), device
-    )
-    return grid, keys
+    high = np.floor(placement.bounds_m[1] / edge).astype(int) + 1
+    x, y, z = (np.arange(a * BLOCK, b * BLOCK) for a, b in zip(low, high, strict=True))
+    footprint = placement.covers(*np.meshgrid(x * voxel_m, y * voxel_m, indexing="ij"))
+    within = (z >= _table_layers(voxel_m)) & (z * voxel_m <= placement.bounds_m[1, 2])
+    return low * BLOCK, footprint[..., None] & within
 
 
-def _near(keys: np.ndarray, points_m: np.ndarray, voxel_m: float) -> np.ndarray:
-    """Return which blocks (N,) hold a measured point or touch one that does."""
-    cells = np.floor(points_m / (voxel_m * BLOCK)).astype(int) - keys.min(axis=0) + 1
-    held = np.zeros(np.ptp(keys, axis=0) + 3, bool)
-    held[tuple(cells.T)] = True
-    return binary_dilation(held, np.ones((3, 3, 3)))[tuple((keys - keys.min(axis=0) + 1).T)]
+def _near(
+    points_m: np.ndarray, lowest: np.ndarray, covered: np.ndarray, truncation_m: float, voxel_m: float
+) -> np.ndarray:
+    """Return which voxels (nx, ny, nz) are in or next to a cell, as large as the truncation, that holds a measured point."""
+    size = max(2, int(np.ceil(truncation_m / voxel_m)))
+    cells = np.floor(points_m / (voxel_m * size) - lowest / size).astype(int)
+    held = np.zeros(np.ceil(np.array(covered.shape) / size).astype(int), bool)
+    held[tuple(cells[((cells >= 0) & (cells < held.shape)).all(axis=1)].T)] = True
+    held = ndimage.binary_dilation(held, np.ones((3, 3, 3)))
+    for axis, n in enumerate(covered.shape):
+        held = np.take(held.repeat(size, axis=axis), np.arange(n), axis=axis)
+    return held & covered
 
 
-def _integrate(grid, keys, depth_m, K, T_camera_object, truncation_voxels) -> None:  # type: ignore[no-untyped-def]
+def _marched(
+    value: np.ndarray, lowest: np.ndarray, voxel_m: float, expected: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the surface where the values (nx, ny, nz) change their sign, by marching cubes in the blocks that need it."""
     import open3d as o3d
 
-    smooth = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(depth_m))
-    smooth = smooth.filter_bilateral(SMOOTH_PIXELS, SMOOTH_DEPTH_M, SMOOTH_SIGMA_PX).as_tensor().numpy()
-    usable = (depth_m > 0) & ~behind_edge(depth_m)
-    depth = np.where(usable, smooth.reshape(depth_m.shape), 0).astype(np.float32)
-    # Open3D truncates projected coordinates: without half a pixel everything would be seen half a pixel off.
-    K = K + [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]
-    image = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(depth))
-    far = float(depth.max()) + 1.0
-    blocks, K, T = (o3d.core.Tensor.from_numpy(array) for array in (keys, K, T_camera_object))
-    grid.integrate(blocks, image, K, T, 1.0, far, truncation_voxels)
-
-
-def behind_edge(depth_m: np.ndarray) -> np.ndarray:
-    """Return where (H, W) a pixel lies far behind one of its eight neighbours."""
-    return depth_m - minimum_filter(np.where(depth_m > 0, depth_m, np.inf), 3) > EDGE_JUMP_M
+    value = np.where(np.abs(value) < _LEAST_VALUE, np.copysign(_LEAST_VALUE, value), value).astype(np.float32)
+    nx, ny, nz = (n // BLOCK for n in value.shape)
+    blocks = value.reshape(nx, BLOCK, ny, BLOCK, nz, BLOCK).transpose(
+        0, 2, 4, 5, 3, 1
+    )  # in a block x runs fastest
+    inside = (3, 4, 5)
+    around = np.ones((3, 3, 3))
+    held = ndimage.binary_dilation((blocks < 0).any(axis=inside), around)
+    held &= ndimage.binary_dilation((blocks > 0).any(axis=inside), around)
+    places = np.argwhere(held)
+    keys = np.ascontiguousarray(places + lowest // BLOCK, np.int32)
+    one = o3d.core.SizeVector([1])
+    grid = o3d.t.geometry.VoxelBlockGrid(
+        ("tsdf", "weight"), (o3d.core.float32,) * 2, (one, one), voxel_m, BLOCK, max(len(keys), 1)
+    )
+    index = grid.hashmap().activate(o3d.core.Tensor.from_numpy(keys))[0].numpy()
+    grid.attribute("tsdf").numpy()[index] = blocks[tuple(places.T)][..., None]
+    grid.attribute("weight").numpy()[index] = 1.0
+    mesh = grid.extract_triangle_mesh(0.5, -1)
+    if mesh.is_empty() or len(mesh.triangle.indices) == 0:
+        raise PipelineError(f"{expected}, found none; check poses and units")
+    return mesh.vertex.positions.numpy().astype(float), mesh.triangle.indices.numpy()
 
 
 def _table_layers(voxel_m: float) -> int:
     return int(np.ceil(TABLE_M / voxel_m))
 
 
-def _close(grid, placement, voxel_m, truncation_m):  # type: ignore[no-untyped-def]
-    """Decide every voxel: seen ones keep their value, unseen ones are solid, beyond footprint, top and table is free.
-
-    Return which voxels were seen as a dense array (nx, ny, nz) and the coordinates (3,) of its first voxel.
-    """
-    points, flat = (t.numpy() for t in grid.voxel_coordinates_and_flattened_indices())
-    value, weight = (grid.attribute(name).reshape((-1,)).numpy() for name in ("tsdf", "weight"))
-    coordinates = np.round(points / voxel_m).astype(np.int32)
-    lowest = coordinates.min(axis=0)
-    place = tuple((coordinates - lowest).T)
-    dense = np.zeros((2, *(coordinates.max(axis=0) - lowest + 1)), np.float32)
-    dense[0][place], dense[1][place] = value[flat], weight[flat]
-    solid, seen = regularised(*dense)
-    solid = solid[place]
-    beyond = ~placement.covers(points[:, 0], points[:, 1]) | (points[:, 2] > placement.bounds_m[1, 2])
-    table = coordinates[:, 2] < _table_layers(voxel_m)
-    solid[beyond | table] = 1.0
-    value[flat] = np.where(np.abs(solid) < _LEAST_VALUE, np.copysign(_LEAST_VALUE, solid), solid)
-    weight[flat] = 1.0
-    return seen, lowest
-
-
-def regularised(value: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the values (nx, ny, nz) drawn to their neighbourhood where measured rarely, and which count as seen.
+def regularised(value: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Return the values (nx, ny, nz) drawn to their neighbourhood where measured rarely; unseen voxels are solid.
 
     Normalised convolution (Knutsson & Westin 1993): the mean around a voxel, in which a measured voxel counts once and an
-    unseen one half as solid, counts as `PRIOR_VOTES` measurements. Without it a few wrong depths leave bubbles inside the
-    walls. Unseen voxels are solid.
+    unseen one `UNSEEN_VOTE` as solid, counts as `PRIOR_VOTES` measurements. Without it a few wrong depths leave bubbles inside the
+    walls.
     """
 
     def around(field: np.ndarray) -> np.ndarray:
-        return gaussian_filter(field.astype(np.float32), 1.0, truncate=2.0, mode="constant")
+        return ndimage.gaussian_filter(field.astype(np.float32), 1.0, truncate=2.0, mode="constant")
 
     measured = weight > 0
-    share = around(np.where(measured, 1.0, UNSEEN_VOTE))
-    mean = around(np.where(measured, value, -UNSEEN_VOTE)) / share
+    mean = around(np.where(measured, value, -UNSEEN_VOTE)) / around(np.where(measured, 1.0, UNSEEN_VOTE))
     drawn = (weight * value + PRIOR_VOTES * mean) / (weight + PRIOR_VOTES)
-    seen = around(weight) >= LEAST_VOTES
-    return np.where(seen, drawn, -1.0), seen
+    return np.where(around(weight) >= LEAST_VOTES, drawn, -1.0)
 
 
-def _seen(vertices: np.ndarray, seen: np.ndarray, lowest: np.ndarray, voxel_m: float) -> np.ndarray:
-    """Return which vertices (V, 3) lie between two voxels that both count as seen."""
-    place = vertices / voxel_m - lowest
-    ends = np.floor(place + 1e-3).astype(int), np.ceil(place - 1e-3).astype(int)
-    return seen[tuple(ends[0].T)] & seen[tuple(ends[1].T)]
+def enclosed(free: np.ndarray) -> np.ndarray:
+    """Return the largest room of free voxels (nx, ny, nz) that are walled in on their level: no way to the border in a layer.
+
+    A pinhole in the wall is no way: ways are at least three voxels wide.
+    """
+    level = np.zeros((3, 3, 3), bool)
+    level[:, :, 1] = ndimage.generate_binary_structure(2, 1)
+    wide = ndimage.binary_erosion(free, level, border_value=1)
+    labels, count = ndimage.label(wide, level)
+    outside = np.zeros(count + 1, bool)
+    outside[0] = True
+    for side in (labels[0], labels[-1], labels[:, 0], labels[:, -1]):
+        outside[side.ravel()] = True
+    rooms, count = ndimage.label(~outside[labels])
+    if count == 0:
+        return np.zeros_like(free)
+    sizes = np.bincount(rooms.ravel())
+    return ndimage.binary_dilation(rooms == sizes[1:].argmax() + 1, level) & free
+
+
+def touches(
+    vertices: np.ndarray, wanted: np.ndarray, walled_in: np.ndarray, lowest: np.ndarray, voxel_m: float
+) -> np.ndarray:
+    """Return which wanted vertices (V,) lie within a voxel of the places (nx, ny, nz) that are walled in."""
+    place = np.rint(vertices / voxel_m).astype(int) - lowest
+    near = ndimage.binary_dilation(walled_in, ndimage.generate_binary_structure(3, 1))
+    return wanted & near[tuple(place.T)]
 
 
 def canonical(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -188,17 +226,3 @@ def largest_component(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.n
     triangles = triangles[part[triangles[:, 0]] == np.bincount(part[triangles[:, 0]]).argmax()]
     used, triangles = np.unique(triangles, return_inverse=True)
     return vertices[used], triangles.reshape(-1, 3)
-
-
-def smoothed(vertices: np.ndarray, triangles: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """Return vertices (V, 3) with the voxels' jitter smoothed away and volumes kept (Taubin 1995); `free` (V,) may move."""
-    from scipy.sparse import coo_matrix, diags
-
-    n, rows, columns = len(vertices), triangles.ravel(), np.roll(triangles, 1, axis=1).ravel()
-    # Every edge of a closed surface belongs to two triangles, which run it in opposite directions.
-    neighbours = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(n, n)).tocsr()
-    mean = diags(1 / np.asarray(neighbours.sum(axis=1)).ravel()) @ neighbours
-    for _ in range(SMOOTHINGS):
-        for factor in TAUBIN:
-            vertices = vertices + factor * (mean @ vertices - vertices) * free[:, None]
-    return vertices

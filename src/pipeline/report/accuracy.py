@@ -15,6 +15,13 @@ from pipeline.geometry.surface import Surface
 PARTS = ("container", "rim", "handle")
 SCALARS = {"radius": "radius_m", "height": "height_m", "capacity": "capacity_m3", "hull_volume": "volume_m3"}
 
+WALL_START_M, WALL_SKIN_M = (
+    0.003,
+    0.0003,
+)  # where rays through the wall start, and how they leave the surface they hit
+# A true point counts as covered when a seen point is as near as the cloud's spacing lets expect, and the surface nearer.
+SEEN_WITHIN_M, COVERED_WITHIN_MM = 0.004, 1.5
+
 
 def main() -> None:
     """Compare what the stages found of one demonstration object with its truth; write the errors."""
@@ -73,21 +80,73 @@ def label_errors(processed: Path, source: str, name: str, truth: Truth) -> dict[
 
 
 def fusion_errors(processed: Path, name: str, truth: Truth) -> dict[str, float]:
-    """Return mean and 95 % distances (mm) from true points of each wall side to the fused surface, and the capacity's error.
+    """Return how far a fused object is from the true one: surface, walls (mm), capacity, coverage, normals (shares).
 
-    From truth to scan: what the scan lacks counts, too.
+    Surface: mean and 95 % distances from true points of each wall side to the fused one: what the scan lacks counts, too.
     """
     vertices_m, triangles = read_mesh(processed / "fuse" / name / "mesh.ply")
     fused = Surface(frames.apply(truth.T_truth_object, vertices_m), triangles)
     distance_mm = fused.distance(points(truth.cloud)) * 1e3
     inner = truth.cloud["inner"].to_numpy()
     found_m3 = cavity(vertices_m, triangles, name=name).capacity_m3
+    cloud = read_table(processed / "fuse" / name / "cloud.parquet", "cloud")
     return {
         "inner_error_mm_mean": float(distance_mm[inner].mean()),
         "outer_error_mm_mean": float(distance_mm[~inner].mean()),
         "inner_error_mm_p95": float(np.quantile(distance_mm[inner], 0.95)),
         "outer_error_mm_p95": float(np.quantile(distance_mm[~inner], 0.95)),
+        "wall_error_mm_mean": _wall_error_mm(fused, truth),
         "capacity_relative_error": found_m3 / truth.facts["capacity_m3"] - 1.0,
+        "cavity_seen_share": _cavity_seen_share(cloud, distance_mm[inner], truth),
+        **_normal_scores(cloud, truth),
+    }
+
+
+def _wall_error_mm(fused: Surface, truth: Truth) -> float:
+    """Return the mean absolute error of the wall's thickness, measured along the normal from inside."""
+    cloud = truth.cloud[truth.cloud["inner"] & ~truth.cloud["rim"]]
+    into = -normals(cloud)
+    start = points(cloud) - WALL_START_M * into
+    found, true = (_thickness(surface, start, into) for surface in (fused, Surface(*truth.mesh)))
+    comparable = np.isfinite(found) & (true < 2.0 * truth.facts["wall_m"])  # not through a handle
+    return float(np.abs(found - true)[comparable].mean() * 1e3)
+
+
+def _thickness(surface: Surface, start: np.ndarray, into: np.ndarray) -> np.ndarray:
+    """Return how thick the wall is (N,) along unit directions (N, 3) from points in the open (N, 3)."""
+    first = surface.hit(start, into)
+    within = np.where(np.isfinite(first), first, 0.0) + WALL_SKIN_M
+    return surface.hit(start + within[:, None] * into, into) + WALL_SKIN_M
+
+
+def _cavity_seen_share(cloud: pd.DataFrame, inner_distance_mm: np.ndarray, truth: Truth) -> float:
+    """Return the share of the true cavity's surface that the fused one covers with points that a camera saw."""
+    from scipy.spatial import cKDTree
+
+    seen_m = frames.apply(truth.T_truth_object, points(cloud[cloud["seen"]]))
+    inner_m = points(truth.cloud[truth.cloud["inner"]])
+    near = cKDTree(seen_m).query(inner_m)[0] < SEEN_WITHIN_M
+    return float(np.mean(near & (inner_distance_mm < COVERED_WITHIN_MM)))
+
+
+def _normal_scores(cloud: pd.DataFrame, truth: Truth) -> dict[str, float]:
+    """Return the shares of points whose normal is within 10° of the true surface's, and of seen ones that face the wrong side."""
+    import open3d as o3d
+
+    scene = o3d.t.geometry.RaycastingScene(nthreads=1)
+    vertices_m, triangles = truth.mesh
+    tensor = o3d.core.Tensor.from_numpy
+    scene.add_triangles(
+        tensor(vertices_m.astype(np.float32)), tensor(np.ascontiguousarray(triangles, np.uint32))
+    )
+    fused_m = frames.apply(truth.T_truth_object, points(cloud)).astype(np.float32)
+    true = scene.compute_closest_points(tensor(fused_m), nthreads=1)["primitive_normals"].numpy()
+    cosine = np.einsum("ij,ij->i", true, frames.rotate(truth.T_truth_object, normals(cloud)))
+    seen, good = cloud["seen"].to_numpy(), cosine > np.cos(np.radians(10.0))
+    return {
+        "normals_within_10_deg_share": float(good.mean()),
+        "seen_normals_within_10_deg_share": float(good[seen].mean()),
+        "normals_flipped_share": float((cosine[seen] < 0.0).mean()),
     }
 
 

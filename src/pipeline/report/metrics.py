@@ -73,6 +73,8 @@ def _headlines(found: dict[str, list[float]]) -> Metrics:
             metrics["fuse.capacity.relative_error_max"] = worst
         elif stage == "fuse":
             metrics[key] = mean
+            least = key.endswith("_share") and "flipped" not in key
+            metrics |= {f"{key}_min": min(values)} if least else {f"{key}_max": worst}
         else:
             metrics[key.replace("warp_label_mapping", "warp.label_mapping")] = mean
     sides = [value for side in ("inner", "outer") for value in found[f"fuse.{side}_error_mm_mean"]]

@@ -1,0 +1,60 @@
+"""How much of each part of a container was seen by a camera: inner wall, floor, rim, outer wall."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from pipeline.fuse.cloud import vertex_normals
+from pipeline.fuse.tsdf import Surface
+from pipeline.geometry.sampling import triangle_areas_and_normals
+
+RIM_M = 0.004  # from the edge between inside and outside, as everywhere
+FLOOR_COSINE = 0.7  # what faces up within 45° is floor
+POOR = 0.8  # a part of which less was seen is named
+
+
+def parts(surface: Surface) -> dict[str, np.ndarray]:
+    """Return the vertices (V,) of each part; what stands on the table belongs to none. No inside: all is outer wall."""
+    above = surface.vertices_m[:, 2] > 0
+    inner = surface.inner & above
+    edge = _border(surface.triangles, inner) & above
+    rim = np.zeros(len(above), bool)
+    if edge.any():
+        rim = above & (cKDTree(surface.vertices_m[edge]).query(surface.vertices_m)[0] <= RIM_M)
+    level = vertex_normals(surface.vertices_m, surface.triangles, 1)[:, 2] > FLOOR_COSINE
+    return {
+        "inner_wall": inner & ~rim & ~level,
+        "floor": inner & ~rim & level,
+        "rim": rim,
+        "outer_wall": above & ~inner & ~rim,
+    }
+
+
+def shares_seen(surface: Surface) -> dict[str, float | None]:
+    """Return which share of each part's area was seen; None where there is no such part."""
+    area, _ = triangle_areas_and_normals(surface.vertices_m, surface.triangles)
+    weight = np.bincount(surface.triangles.ravel(), np.repeat(area, 3), len(surface.vertices_m))
+    shares: dict[str, float | None] = {}
+    for name, part in parts(surface).items():
+        total = weight[part].sum()
+        shares[name] = float(weight[part & surface.seen].sum() / total) if total > 0 else None
+    return shares
+
+
+def complaints(shares: dict[str, float | None]) -> list[str]:
+    """Return one sentence for each part that was poorly seen or not at all."""
+    told = []
+    for name, share in shares.items():
+        what = name.replace("_", " ")
+        if share is None:
+            told.append(f"the {what} was not seen at all: dark or shiny, or no view from high enough")
+        elif share < POOR:
+            told.append(f"the {what} was poorly seen, {share:.0%} of it; the rest is closed by guess")
+    return told
+
+
+def _border(triangles: np.ndarray, inner: np.ndarray) -> np.ndarray:
+    """Return the vertices (V,) with an edge from inside to outside."""
+    edges = np.concatenate([triangles[:, :2], triangles[:, 1:], triangles[:, ::2]])
+    border = np.zeros(len(inner), bool)
+    border[edges[inner[edges[:, 0]] != inner[edges[:, 1]]].ravel()] = True
+    return border

@@ -1,0 +1,152 @@
+"""Walls of a millimetre or two, floors near the table, floors that nobody saw, and how much of what was seen."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import trimesh
+
+from pipeline.fuse import coverage, tsdf
+from pipeline.fuse.layouts import Views
+from pipeline.fuse.measuring import signed_distances
+from pipeline.fuse.table import place, table_plane, world_points
+from pipeline.geometry import frames
+from pipeline.geometry.cavity import cavity
+from pipeline.geometry.surface import Surface
+from pipeline.scan import camera, recording
+
+VOXEL_M, TRUNCATION_M = 0.00125, 0.0025
+
+
+def thin(foot_mm: float, lip_mm: float, height_mm: float, wall_mm: float, floor_mm: float) -> SimpleNamespace:
+    """A cone-shaped cup or bowl with a round lip; a floor of 0: a ring without one."""
+    r = wall_mm / 2
+    z = np.linspace(0, height_mm - r, 13)
+    side = foot_mm + (lip_mm - foot_mm) * z / z[-1]
+    angle = np.linspace(0, np.pi, 9)[1:-1]
+    lip = np.column_stack([lip_mm - r + r * np.cos(angle), z[-1] + r * np.sin(angle)])
+    inner = np.column_stack([np.interp(np.maximum(z, floor_mm), z, side) - wall_mm, np.maximum(z, floor_mm)])
+    rows = [np.column_stack([side, z]), lip, inner[::-1]]
+    rows = [[[0, 0]], *rows, [[0, floor_mm]]] if floor_mm else [*rows, [[side[0], 0]]]
+    mesh = trimesh.creation.revolve(np.concatenate(rows) * 1e-3, sections=128)
+    mesh.fix_normals()
+    return SimpleNamespace(
+        name="thin",
+        vertices_m=np.asarray(mesh.vertices),
+        triangles=np.asarray(mesh.faces),
+        height_m=height_mm * 1e-3,
+    )
+
+
+def scanned(body: SimpleNamespace, views: int = 36) -> tuple[Views, np.ndarray]:
+    T_world_object = recording.pose_on_table(recording.generator(1, body.name, 0))
+    pairs = recording.views(body, T_world_object, views, 0.6, 1.0, 1)
+    depths = [(depth_mm / np.float32(1000)).astype(np.float32) for depth_mm, _ in pairs]
+    return Views(depths, [pose for _, pose in pairs], camera.intrinsics()), T_world_object
+
+
+def fused(views: Views, truncation_m: float = TRUNCATION_M) -> tuple[tsdf.Surface, np.ndarray]:
+    points, eyes = world_points(views), np.array([T[:3, 3] for T in views.T_world_cameras])
+    placement = place(points, table_plane(points, eyes, "thin", np.random.default_rng(2)), "thin")
+    return tsdf.fuse(views, placement, VOXEL_M, truncation_m, "thin"), placement.T_object_world
+
+
+def wall_mm(surface: Surface, middle: np.ndarray) -> np.ndarray:
+    azimuth = np.linspace(0, 2 * np.pi, 90, endpoint=False)
+    out = np.stack([np.cos(azimuth), np.sin(azimuth), 0 * azimuth], axis=-1)
+    return 1e3 * (0.3 - surface.hit(middle + 0.3 * out, -out) - surface.hit(np.tile(middle, (90, 1)), out))
+
+
+@pytest.fixture(scope="module")
+def bowl():
+    body = thin(30, 75, 55, 1.5, 2.5)
+    views, T_world_object = scanned(body)
+    surface, T_object_world = fused(views)
+    return SimpleNamespace(body=body, views=views, surface=surface, T=T_object_world @ T_world_object)
+
+
+def test_a_thin_bowl_keeps_capacity_radius_height_and_wall(bowl):
+    cup = cavity(bowl.surface.vertices_m, bowl.surface.triangles, name="bowl")
+    true = cavity(bowl.body.vertices_m, bowl.body.triangles, name="bowl")
+    assert cup.capacity_m3 == pytest.approx(true.capacity_m3, rel=0.03)
+    radius, true_radius = (np.hypot(*(c.rim_m - c.opening_m)[:, :2].T).mean() for c in (cup, true))
+    assert radius == pytest.approx(true_radius, rel=0.01)
+    assert bowl.surface.vertices_m[:, 2].max() == pytest.approx(bowl.body.height_m, rel=0.02)
+    middle = bowl.T[:3, 3] + [0, 0, 0.03]
+    found = wall_mm(Surface(bowl.surface.vertices_m, bowl.surface.triangles), middle)
+    shape = Surface(frames.apply(bowl.T, bowl.body.vertices_m), bowl.body.triangles)
+    assert abs(np.mean(found - wall_mm(shape, middle))) < 0.3
+
+
+def test_the_inside_of_a_thin_bowl_is_seen_and_named(bowl):
+    shares = coverage.shares_seen(bowl.surface)
+    assert shares["floor"] > 0.98
+    assert shares["inner_wall"] > 0.98
+    assert coverage.complaints(shares) == []
+    area = {name: part.sum() for name, part in coverage.parts(bowl.surface).items()}
+    assert area["outer_wall"] > area["rim"]
+    assert area["inner_wall"] + area["floor"] > area["rim"]
+
+
+def test_a_truncation_of_ten_walls_changes_little(bowl):
+    far, _ = fused(bowl.views, 0.015)
+    cup, near = (cavity(s.vertices_m, s.triangles, name="bowl") for s in (far, bowl.surface))
+    assert cup.capacity_m3 == pytest.approx(near.capacity_m3, rel=0.03)
+
+
+def without_floor(views: Views, T_world_object: np.ndarray, radius_m: float) -> Views:
+    """The same views, but nothing comes back from a disc in the middle of the floor."""
+    depths = []
+    K = views.intrinsics
+    for depth, T_world_camera in zip(views.depths_m, views.T_world_cameras, strict=True):
+        v, u = np.mgrid[: depth.shape[0], : depth.shape[1]]
+        rays = np.stack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones(depth.shape)], axis=-1)
+        T_object_camera = frames.inverse(T_world_object) @ T_world_camera
+        places = frames.apply(T_object_camera, rays * depth[..., None])
+        dark = (np.hypot(places[..., 0], places[..., 1]) < radius_m) & (places[..., 2] < 0.01)
+        depths.append(np.where(dark, np.float32(0), depth))
+    return replace(views, depths_m=depths)
+
+
+def test_a_floor_that_nobody_saw_is_no_drain(bowl):
+    """Black in the middle: what is unseen stays closed, and the share seen says so."""
+    T_world_object = recording.pose_on_table(recording.generator(1, bowl.body.name, 0))
+    surface, _ = fused(without_floor(bowl.views, T_world_object, 0.012))
+    cup = cavity(surface.vertices_m, surface.triangles, name="bowl")
+    true = cavity(bowl.body.vertices_m, bowl.body.triangles, name="bowl")
+    assert cup.capacity_m3 == pytest.approx(true.capacity_m3, rel=0.05)
+    shares = coverage.shares_seen(surface)
+    assert shares["floor"] < 0.9 < shares["inner_wall"]
+
+
+def test_the_table_closes_a_ring_without_a_floor():
+    ring = thin(35, 38, 50, 2.0, 0.0)
+    surface, _ = fused(scanned(ring, 24)[0])
+    assert surface.table_closed_m2 == pytest.approx(np.pi * 0.033**2, rel=0.15)
+    cup = cavity(surface.vertices_m, surface.triangles, name="ring")
+    assert cup.capacity_m3 == pytest.approx(
+        np.pi / 3 * 0.05 * (0.033**2 + 0.033 * 0.036 + 0.036**2), rel=0.04
+    )
+
+
+def test_what_was_not_seen_at_all_is_named():
+    told = coverage.complaints({"floor": None, "inner_wall": 0.3, "rim": 1.0, "outer_wall": 0.9})
+    assert len(told) == 2
+    assert "floor was not seen at all" in told[0]
+    assert "inner wall was poorly seen, 30%" in told[1]
+
+
+def test_two_sides_of_a_sheet_are_told_apart():
+    """Two views of a sheet 1 mm thick, from either side: free on both sides, solid only between them."""
+    plane = np.array([[1, 0, 0, 0.001, 1], [-1, 0, 0, 0, 1]], np.float32)
+    view = np.array([[0, 1, 1], [1, 1, 1]])
+    projection = np.zeros((2, 3, 4))
+    projection[:, 2, 3] = 1.0
+    near = np.ones((9, 1, 1), bool)
+    lowest = np.array([-3, 0, 0])
+    value, weight = signed_distances(lowest, 0.0005, near[:, :, 0], near, plane, view, projection, 0.01)
+    x_m = (lowest[0] + np.arange(9)) * 0.0005
+    expected = np.maximum(x_m - 0.001, -x_m)
+    np.testing.assert_allclose(value[:, 0, 0] * 0.01, expected, atol=1e-7)
+    assert (weight == 2).all()
