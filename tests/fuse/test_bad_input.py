@@ -53,7 +53,7 @@ def test_something_else(tmp_path):
     refused(tmp_path / "notes", "readme.doc")
     box(tmp_path / "two" / "a.ply")
     box(tmp_path / "two" / "b.ply")
-    refused(tmp_path / "two", "a.ply, b.ply", "one scan a folder")
+    refused(tmp_path / "two", "a.ply and b.ply", "one scan a folder")
 
 
 def test_no_intrinsics(folder):

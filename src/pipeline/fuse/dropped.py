@@ -17,9 +17,9 @@ def read(dropped: DroppedMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     The world is the file's own frame in metres. The mesh stands with its lowest point on z = 0, over the origin.
     """
     mesh = _repaired(_load(dropped.path), dropped.path)
-    world = np.asarray(mesh.vertices, float) * dropped.options.unit_m
+    world = np.asarray(mesh.vertices, float) * (dropped.options.unit_m or 1.0)
     _check_size(world, dropped.path)
-    T_object_world = _upright(world, dropped.options.up)
+    T_object_world = _upright(world, dropped.options.up or "z")
     return frames.apply(T_object_world, world), np.asarray(mesh.faces, np.int64), T_object_world
 
 

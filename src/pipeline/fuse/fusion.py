@@ -9,7 +9,7 @@ import pandas as pd
 
 from pipeline.artefacts import Mesh
 from pipeline.errors import PipelineError
-from pipeline.fuse import dropped, layouts, table, tsdf
+from pipeline.fuse import dropped, layouts, recorded, tsdf
 from pipeline.fuse.cloud import cloud
 
 LEAST_POINTS = 5000
@@ -38,12 +38,9 @@ def fused(folder: Path, *, voxel_m: float, truncation_m: float, n_points: int, s
         vertices, triangles, T_object_world = dropped.read(raw)
         surface = tsdf.Surface(vertices, triangles, np.ones(len(vertices), bool))
         return _result(surface, n_points, _SMOOTH_DROPPED, rng, _mesh_facts(T_object_world, raw))
-    points = table.world_points(raw)
-    eyes = np.array([T[:3, 3] for T in raw.T_world_cameras])
-    plane = table.table_plane(points, eyes, str(folder), rng)
-    placement = table.place(points, plane, str(folder))
-    surface = tsdf.fuse(raw, placement, voxel_m, truncation_m, str(folder))
-    facts = _scan_facts(raw, plane, placement, surface, str(folder), rng)
+    scan = recorded.located(raw, str(folder), rng)
+    surface = tsdf.fuse(scan.views, scan.placement, voxel_m, truncation_m, str(folder))
+    facts = scan.facts() | _residuals(scan, surface, str(folder), rng)
     return _result(surface, n_points, _SMOOTH_FUSED, rng, facts)
 
 
@@ -64,35 +61,22 @@ def _result(
 
 
 def _mesh_facts(T_object_world: np.ndarray, raw: layouts.DroppedMesh) -> dict[str, Any]:
-    facts = {"layout": "mesh", "n_views": 0, "unit_m": raw.options.unit_m, "table_plane_world": None}
+    facts = {"layout": "mesh", "n_views": 0, "unit_m": raw.options.unit_m or 1.0, "table_plane_world": None}
     return facts | {"T_object_world": T_object_world.tolist(), "table_rms_m": None, "residual_m": None}
 
 
-def _scan_facts(
-    views: layouts.Views,
-    plane: table.Plane,
-    placement: table.Placement,
-    surface: tsdf.Surface,
-    name: str,
-    rng: np.random.Generator,
+def _residuals(
+    scan: recorded.Located, surface: tsdf.Surface, name: str, rng: np.random.Generator
 ) -> dict[str, Any]:
-    measured = placement.points_m[rng.integers(len(placement.points_m), size=_RESIDUAL_POINTS)]
-    residual = _distance(surface, measured)
+    points = scan.placement.points_m
+    residual = _distance(surface, points[rng.integers(len(points), size=_RESIDUAL_POINTS)])
     median, high = np.quantile(residual, [0.5, 0.95])
     if median > LARGEST_RESIDUAL_M:
         raise PipelineError(
             f"{name}: expected measured points within {LARGEST_RESIDUAL_M * 1e3:g} mm of the fused surface, found half of them "
             f"beyond {median * 1e3:.1f} mm; the poses do not fit the images (camera→world, in metres?)"
         )
-    return {
-        "layout": "7-scenes",
-        "n_views": len(views.depths_m),
-        "unit_m": 1.0,
-        "T_object_world": placement.T_object_world.tolist(),
-        "table_plane_world": [*plane.normal.tolist(), plane.offset_m],
-        "table_rms_m": plane.rms_m,
-        "residual_m": {"median": float(median), "quantile_95": float(high)},
-    }
+    return {"residual_m": {"median": float(median), "quantile_95": float(high)}}
 
 
 def _distance(surface: tsdf.Surface, points_m: np.ndarray) -> np.ndarray:

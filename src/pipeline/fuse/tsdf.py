@@ -45,10 +45,11 @@ def fuse(views: Views, placement: Placement, voxel_m: float, truncation_m: float
         )
     grid, keys = _grid(placement, voxel_m)
     near = _near(keys, placement.points_m, voxel_m)
-    for i, (depth, T_world_camera) in enumerate(zip(views.depths_m, views.T_world_cameras, strict=True)):
+    cameras = zip(views.depths_m, views.intrinsics, views.T_world_cameras, strict=True)
+    for i, (depth, K, T_world_camera) in enumerate(cameras):
         T_camera_object = frames.inverse(placement.T_object_world @ T_world_camera)
         blocks = keys if i % FREE_STRIDE == 0 else keys[near]
-        _integrate(grid, blocks, depth, views.intrinsics, T_camera_object, truncation_m / voxel_m)
+        _integrate(grid, blocks, depth, K, T_camera_object, truncation_m / voxel_m)
     measured, lowest = _close(grid, placement, voxel_m, truncation_m)
     mesh = grid.extract_triangle_mesh(0.5, -1)
     if mesh.is_empty() or len(mesh.triangle.indices) == 0:

@@ -1,0 +1,203 @@
+"""The one object on the table: what belongs to it, where its frame is."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from pipeline.errors import PipelineError
+from pipeline.fuse import agreement, table
+from pipeline.fuse.raw import Views
+from pipeline.fuse.table import CELL_M, CURE, Placement, Plane, Points
+from pipeline.geometry import frames
+
+ABOVE_M, ABOVE_SIGMAS, MOST_ABOVE_M = (
+    0.008,
+    3.0,
+    0.025,
+)  # points this far above the table are no noise of the table
+MARGIN_M = 0.008  # around the object
+LARGEST_M = 0.45
+MOST_BELOW = 0.05  # of the points over the footprint may lie more than `BELOW_M` below the table
+BELOW_M = 0.010
+LEAST_POINTS = 300
+# A second object: this far from the first at most, with this share of its points, in this share of the views.
+SECOND_M, SECOND_POINTS, SECOND_VIEWS = 0.15, 0.15, 0.5
+OTHERS = 12  # views that are asked whether they look through a point
+AROUND_M = 0.15  # the table is fitted again this far around the object: depth cameras bend large planes
+_HITS_OF_NOISE = 3  # stray pixels hit a cell once or twice; a cell of the object is hit by many views
+
+
+class NoObject(PipelineError):
+    """There is no object on this plane; another plane may be the table."""
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """Points that stand together on the table: their mask (N,), share of the views that see them, bounds (2, 3)."""
+
+    mask: np.ndarray
+    n: int
+    views: float
+    bounds_m: np.ndarray
+
+    @property
+    def centre_m(self) -> np.ndarray:
+        """The middle (2,) of the footprint."""
+        return self.bounds_m[:, :2].mean(axis=0)
+
+    def shown(self) -> str:
+        """Return size and place in words."""
+        size = " × ".join(f"{1000 * e:.0f}" for e in np.ptp(self.bounds_m, axis=0))
+        return f"one of {size} mm at ({self.centre_m[0]:.2f}, {self.centre_m[1]:.2f}) m"
+
+
+def find(views: Views, name: str, rng: np.random.Generator) -> tuple[Plane, Placement]:
+    """Find the table and the one object on it, near what the cameras look at; the rest is background.
+
+    The table is the plane of most points on which something stands. A `PipelineError` says what is missing, or shows
+    both objects when there are two.
+    """
+    points, middle = table.world_points(views), table.focus(views)
+    near = points.only(np.linalg.norm(points.places_m - middle, axis=1) < table.NEAR_M)
+    eyes = np.array([T[:3, 3] for T in views.T_world_cameras])
+    failures: list[NoObject] = []
+    for plane in table.planes(near.places_m, eyes, name, rng):
+        above = _above(near, plane, views)
+        try:
+            first = place(near, above, plane, middle, name)
+            plane = _locally(near, plane, first, eyes)
+            return plane, place(near, above, plane, middle, name)
+        except NoObject as failure:
+            failures.append(failure)
+    raise failures[0]
+
+
+def _above(points: Points, plane: Plane, views: Views) -> Points:
+    """Return what rises out of the table's noise and stays where it is: no hand and no robot's arm."""
+    height = plane.height(points.places_m)
+    table_m = height[np.abs(height) < MOST_ABOVE_M]
+    spread = 1.4826 * float(np.median(np.abs(table_m - np.median(table_m)))) if len(table_m) else 0.0
+    least = float(np.clip(ABOVE_SIGMAS * spread, ABOVE_M, MOST_ABOVE_M))
+    above = points.only((height > least) & (height < LARGEST_M))
+    return above.only(~agreement.seen_through(above.places_m, views, above.view, OTHERS))
+
+
+def place(points: Points, above: Points, plane: Plane, focus: np.ndarray, name: str) -> Placement:
+    """Return where the object stands on the plane: what of the points above it is nearest to the focus (3,)."""
+    T_table_world = table_frame(plane)
+    places = frames.apply(T_table_world, above.places_m)
+    middle = frames.apply(T_table_world, focus)[:2]
+    near = np.linalg.norm(places[:, :2] - middle, axis=1) < LARGEST_M
+    places = places[near]
+    found = _clusters(Points(places, above.view[near]), middle) if len(places) else []
+    if not found or found[0].n < LEAST_POINTS:
+        raise NoObject(
+            f"{name}: expected an object on the table, found {found[0].n if found else 0} points together more than "
+            f"{ABOVE_M * 1e3:.0f} mm above it; {CURE} and that the object is in view"
+        )
+    cluster = found[0]
+    _check_size(cluster, name)
+    _check_alone(found, middle, name)
+    own = places[cluster.mask]
+    centre = np.array([*cluster.centre_m, 0.0])
+    T_object_world = frames.transform(np.eye(3), -centre) @ T_table_world
+    placement = Placement(T_object_world, *_region(own - centre), own - centre)
+    _check_below(placement, frames.apply(T_object_world, points.places_m), name)
+    return placement
+
+
+def _locally(points: Points, plane: Plane, placement: Placement, eyes: np.ndarray) -> Plane:
+    """Return the plane fitted again to the table around the object."""
+    places = frames.apply(placement.T_object_world, points.places_m)
+    low, high = placement.bounds_m[0, :2] - AROUND_M, placement.bounds_m[1, :2] + AROUND_M
+    around = ((places[:, :2] > low) & (places[:, :2] < high)).all(axis=1)
+    around &= ~placement.covers(places[:, 0], places[:, 1])
+    if np.count_nonzero(around) < LEAST_POINTS:
+        return plane
+    return table.refined(points.places_m[around], plane.normal, plane.offset_m, eyes)
+
+
+def table_frame(plane: Plane) -> np.ndarray:
+    """Return T_table_world: z up from the table, x along the world's x (or y, when that is nearly upright)."""
+    along = np.eye(3)[0 if abs(plane.normal[0]) < 0.9 else 1]
+    x = along - (along @ plane.normal) * plane.normal
+    x /= np.linalg.norm(x)
+    R = np.stack([x, np.cross(plane.normal, x), plane.normal])
+    return frames.transform(R, np.array([0.0, 0.0, plane.offset_m]))
+
+
+def _clusters(points: Points, middle: np.ndarray) -> list[Cluster]:
+    """Return what stands together, seen from above; the most likely object first, then by number of points.
+
+    What reaches beyond the circle that was searched is background.
+    """
+    places, n_views = points.places_m, points.view.max() + 1
+    origin = places[:, :2].min(axis=0)
+    cells = np.floor((places[:, :2] - origin) / CELL_M).astype(int)
+    counts = np.zeros(cells.max(axis=0) + 1, int)
+    np.add.at(counts, tuple(cells.T), 1)
+    hit = counts > min(_HITS_OF_NOISE, n_views // 3)
+    labels, n = ndimage.label(ndimage.binary_closing(np.pad(hit, 3), iterations=2), np.ones((3, 3)))
+    label = labels[3:-3, 3:-3][tuple(cells.T)]
+    seen = np.zeros((n + 1, n_views), int)
+    np.add.at(seen, (label, points.view), 1)
+    found = []
+    for k in np.nonzero(seen.sum(axis=1) >= LEAST_POINTS / 3)[0]:
+        mask = label == k
+        own = places[mask]
+        reach = np.linalg.norm(own[:, :2] - middle, axis=1)
+        if k == 0 or np.mean(reach > LARGEST_M - 2 * CELL_M) > 0.01:
+            continue
+        tall = np.sort(own[:, 2])[-10]
+        bounds = np.array([[*own.min(axis=0)[:2], 0.0], [*own.max(axis=0)[:2], tall]])
+        found.append(Cluster(mask, int(mask.sum()), float((seen[k] >= 10).mean()), bounds))
+    return sorted(
+        found, key=lambda c: -c.n * c.views * np.exp(-((np.linalg.norm(c.centre_m - middle) / 0.15) ** 2))
+    )
+
+
+def _check_size(cluster: Cluster, name: str) -> None:
+    size = np.ptp(cluster.bounds_m, axis=0)
+    if max(size) > LARGEST_M:
+        raise NoObject(
+            f"{name}: expected an object of at most {LARGEST_M} m on the table, found one of "
+            f"{' × '.join(f'{e:.2f}' for e in size)} m; check units, poses and what stands around the object"
+        )
+
+
+def _check_alone(found: list[Cluster], middle: np.ndarray, name: str) -> None:
+    first = found[0]
+    reach = np.linalg.norm(first.centre_m - middle)
+    for other in found[1:]:
+        low, high = first.bounds_m[:, :2]
+        gap = np.linalg.norm(
+            np.maximum(np.maximum(low - other.bounds_m[1, :2], other.bounds_m[0, :2] - high), 0.0)
+        )
+        central = np.linalg.norm(other.centre_m - middle) < 1.5 * reach + 0.05
+        alike = other.n > SECOND_POINTS * first.n and other.views >= SECOND_VIEWS
+        if alike and (gap < SECOND_M or central):
+            raise PipelineError(
+                f"{name}: expected one object on the table, found two, {first.shown()} and {other.shown()} on it; "
+                "record one at a time"
+            )
+
+
+def _check_below(placement: Placement, points_m: np.ndarray, name: str) -> None:
+    """Refuse scans that see through the table under the object: their poses or depths are wrong."""
+    over = points_m[placement.covers(points_m[:, 0], points_m[:, 1])]
+    share = float(np.mean(over[:, 2] < -BELOW_M))
+    if share > MOST_BELOW:
+        raise NoObject(
+            f"{name}: expected nothing below the table under the object, found {share:.0%} of the points there; {CURE}"
+        )
+
+
+def _region(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    low = np.array([*points.min(axis=0)[:2], 0.0]) - [MARGIN_M, MARGIN_M, 0.0]
+    high = np.array([*points.max(axis=0)[:2], np.sort(points[:, 2])[-10]]) + MARGIN_M
+    cells = np.floor((points[:, :2] - low[:2]) / CELL_M).astype(int)
+    footprint = np.zeros(np.ceil((high - low)[:2] / CELL_M).astype(int) + 1, bool)
+    footprint[tuple(cells.T)] = True
+    footprint = ndimage.binary_fill_holes(footprint)
+    return np.array([low, high]), ndimage.binary_dilation(footprint, np.ones((3, 3)), iterations=2)
