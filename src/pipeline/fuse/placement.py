@@ -23,6 +23,8 @@ BELOW_M = 0.010
 LEAST_POINTS = 300
 # A second object: this far from the first at most, with this share of its points, in this share of the views.
 SECOND_M, SECOND_POINTS, SECOND_VIEWS = 0.15, 0.15, 0.5
+# A base under the object: its border is flat, it is so many times larger than what stands on it.
+FLAT_M, FLAT_SHARE, BASE_AREAS = 0.004, 0.7, 2.0
 OTHERS = 12  # views that are asked whether they look through a point
 AROUND_M = 0.15  # the table is fitted again this far around the object: depth cameras bend large planes
 _HITS_OF_NOISE = 3  # stray pixels hit a cell once or twice; a cell of the object is hit by many views
@@ -46,10 +48,12 @@ class Cluster:
         """The middle (2,) of the footprint."""
         return self.bounds_m[:, :2].mean(axis=0)
 
-    def shown(self) -> str:
-        """Return size and place in words."""
+    def shown(self, T_world_table: np.ndarray, views: Views) -> str:
+        """Return size and place in words, and where in which image it is."""
         size = " × ".join(f"{1000 * e:.0f}" for e in np.ptp(self.bounds_m, axis=0))
-        return f"one of {size} mm at ({self.centre_m[0]:.2f}, {self.centre_m[1]:.2f}) m"
+        place = frames.apply(T_world_table, np.array([*self.centre_m, self.bounds_m[1, 2] / 2]))
+        x, y, z = views.intrinsics[0] @ frames.apply(frames.inverse(views.T_world_cameras[0]), place)
+        return f"one of {size} mm at pixel ({x / z:.0f}, {y / z:.0f}) of {views.names[0]}"
 
 
 def find(views: Views, name: str, rng: np.random.Generator) -> tuple[Plane, Placement]:
@@ -63,11 +67,13 @@ def find(views: Views, name: str, rng: np.random.Generator) -> tuple[Plane, Plac
     eyes = np.array([T[:3, 3] for T in views.T_world_cameras])
     failures: list[NoObject] = []
     for plane in table.planes(near.places_m, eyes, name, rng):
-        above = _above(near, plane, views)
         try:
-            first = place(near, above, plane, middle, name)
-            plane = _locally(near, plane, first, eyes)
-            return plane, place(near, above, plane, middle, name)
+            first = place(near, _above(near, plane, views), plane, middle, views, name)
+            height_m = _platter_m(first)
+            if height_m is not None:
+                plane = Plane(plane.normal, plane.offset_m - height_m, plane.rms_m)
+            plane = _locally(near, plane, first, eyes, on_it=height_m is not None)
+            return plane, place(near, _above(near, plane, views), plane, middle, views, name)
         except NoObject as failure:
             failures.append(failure)
     raise failures[0]
@@ -83,7 +89,9 @@ def _above(points: Points, plane: Plane, views: Views) -> Points:
     return above.only(~agreement.seen_through(above.places_m, views, above.view, OTHERS))
 
 
-def place(points: Points, above: Points, plane: Plane, focus: np.ndarray, name: str) -> Placement:
+def place(
+    points: Points, above: Points, plane: Plane, focus: np.ndarray, views: Views, name: str
+) -> Placement:
     """Return where the object stands on the plane: what of the points above it is nearest to the focus (3,)."""
     T_table_world = table_frame(plane)
     places = frames.apply(T_table_world, above.places_m)
@@ -98,7 +106,7 @@ def place(points: Points, above: Points, plane: Plane, focus: np.ndarray, name: 
         )
     cluster = found[0]
     _check_size(cluster, name)
-    _check_alone(found, middle, name)
+    _check_alone(found, middle, frames.inverse(T_table_world), views, name)
     own = places[cluster.mask]
     centre = np.array([*cluster.centre_m, 0.0])
     T_object_world = frames.transform(np.eye(3), -centre) @ T_table_world
@@ -107,8 +115,33 @@ def place(points: Points, above: Points, plane: Plane, focus: np.ndarray, name: 
     return placement
 
 
-def _locally(points: Points, plane: Plane, placement: Placement, eyes: np.ndarray) -> Plane:
-    """Return the plane fitted again to the table around the object."""
+def _platter_m(placement: Placement) -> float | None:
+    """Return the height of a flat base that the object stands on, such as a turntable's, or None.
+
+    A base is flat all along its border, and much larger than what stands on it.
+    """
+    z = placement.points_m[:, 2]
+    cells = tuple(np.floor((placement.points_m[:, :2] - placement.bounds_m[0, :2]) / CELL_M).astype(int).T)
+    top = np.zeros(placement.footprint.shape)
+    np.maximum.at(top, cells, z)
+    held = ndimage.binary_fill_holes(ndimage.binary_closing(top > 0))
+    border = held & ~ndimage.binary_erosion(held, iterations=3) & (top > 0)
+    height = float(np.median(top[border]))
+    flat = np.abs(top - height) < FLAT_M
+    above = top > height + ABOVE_M
+    if np.mean(flat[border]) < FLAT_SHARE or np.count_nonzero(z > height + ABOVE_M) < LEAST_POINTS:
+        return None
+    if np.count_nonzero(held) < BASE_AREAS * np.count_nonzero(ndimage.binary_fill_holes(above)):
+        return None
+    return float(np.median(z[np.abs(z - height) < FLAT_M]))
+
+
+def _locally(points: Points, plane: Plane, placement: Placement, eyes: np.ndarray, on_it: bool) -> Plane:
+    """Return the plane fitted again to the table around the object, or to the base that it stands on."""
+    if on_it:
+        places = frames.apply(placement.T_object_world, points.places_m)
+        own = placement.covers(places[:, 0], places[:, 1])
+        return table.refined(points.places_m[own], plane.normal, plane.offset_m, eyes)
     places = frames.apply(placement.T_object_world, points.places_m)
     low, high = placement.bounds_m[0, :2] - AROUND_M, placement.bounds_m[1, :2] + AROUND_M
     around = ((places[:, :2] > low) & (places[:, :2] < high)).all(axis=1)
@@ -166,7 +199,9 @@ def _check_size(cluster: Cluster, name: str) -> None:
         )
 
 
-def _check_alone(found: list[Cluster], middle: np.ndarray, name: str) -> None:
+def _check_alone(
+    found: list[Cluster], middle: np.ndarray, T_world_table: np.ndarray, views: Views, name: str
+) -> None:
     first = found[0]
     reach = np.linalg.norm(first.centre_m - middle)
     for other in found[1:]:
@@ -178,8 +213,8 @@ def _check_alone(found: list[Cluster], middle: np.ndarray, name: str) -> None:
         alike = other.n > SECOND_POINTS * first.n and other.views >= SECOND_VIEWS
         if alike and (gap < SECOND_M or central):
             raise PipelineError(
-                f"{name}: expected one object on the table, found two, {first.shown()} and {other.shown()} on it; "
-                "record one at a time"
+                f"{name}: expected one object on the table, found two, {first.shown(T_world_table, views)} and "
+                f"{other.shown(T_world_table, views)}; record one at a time"
             )
 
 
