@@ -1,36 +1,48 @@
-"""A mesh that a user dropped: read, repaired, put upright on z = 0."""
+"""A mesh or a point cloud that a user dropped: read, repaired, put upright on z = 0."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from pipeline.errors import PipelineError
-from pipeline.fuse.layouts import DroppedMesh
+from pipeline.fuse import drains, mending
+from pipeline.fuse.raw import UPS, DroppedMesh
+from pipeline.fuse.wrapping import Mesh, wrapped
 from pipeline.geometry import frames
+from pipeline.geometry.cavity import cavity
 
 LARGEST_M, SMALLEST_M = 2.0, 0.005
 
 
-def read(dropped: DroppedMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return vertices (V, 3) in metres, object frame, triangles (F, 3) oriented outwards, and T_object_world.
+def read(
+    dropped: DroppedMesh, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+    """Return vertices (V, 3) in metres, object frame, triangles (F, 3) oriented outwards, T_object_world and what was done.
 
     The world is the file's own frame in metres. The mesh stands with its lowest point on z = 0, over the origin.
     """
-    mesh = _repaired(_load(dropped.path), dropped.path)
-    world = np.asarray(mesh.vertices, float) * (dropped.options.unit_m or 1.0)
-    _check_size(world, dropped.path)
-    T_object_world = _upright(world, dropped.options.up or "z")
-    return frames.apply(T_object_world, world), np.asarray(mesh.faces, np.int64), T_object_world
+    mesh, file, up = _load(dropped.path), str(dropped.path), dropped.options.up or "z"
+    mesh.vertices = np.asarray(mesh.vertices, float) * (dropped.options.unit_m or 1.0)
+    mesh = mending.cleaned(mesh, file)
+    _check_size(mesh.vertices, dropped.path)
+    T_object_world = upright(mesh.vertices, up)
+    mesh.vertices = frames.apply(T_object_world, mesh.vertices)
+    (vertices, triangles), facts = mending.mended(mesh, dropped.options.wall_m, file, rng)
+    vertices, triangles, done = _holding((vertices, triangles), up, file)
+    T_stood = upright(vertices, "z")
+    facts = {"layout": "mesh", "n_views": 0, "mended": facts | done}
+    return frames.apply(T_stood, vertices), triangles, T_stood @ T_object_world, facts
 
 
-def _load(path: Path):  # type: ignore[no-untyped-def]
+def _load(path: Path) -> Any:
     import trimesh
 
     try:
         mesh = trimesh.load(path, force="mesh", process=False)
     except Exception as error:  # each reader of trimesh has errors of its own
         raise PipelineError(
-            f"{path}: expected a mesh, but it cannot be read: {error}; export it again"
+            f"{path}: expected a mesh, but it cannot be read: {' '.join(str(error).split()):.200}; export it again"
         ) from error
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
         raise PipelineError(
@@ -39,23 +51,37 @@ def _load(path: Path):  # type: ignore[no-untyped-def]
     return mesh
 
 
-def _repaired(mesh, path: Path):  # type: ignore[no-untyped-def]
-    """Merge equal vertices, drop empty and double faces, wind faces alike and outwards."""
-    import trimesh
+def _holding(mesh: Mesh, up: str, file: str) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
+    """Return the mesh with small holes closed if it leaks; refuse it when its opening points elsewhere."""
+    if holds(mesh):
+        return *mesh, {"drains_closed": 0}
+    field, n = drains.plugged(wrapped(*mesh))
+    if n and holds(field.surface()):
+        return *field.surface(), {"drains_closed": n, "remeshed": True}
+    turned = {other: frames.apply(upright(mesh[0], other), mesh[0]) for other in UPS if other != "z"}
+    for axis, vertices in turned.items():
+        if holds((vertices, mesh[1])):
+            raise PipelineError(
+                f"{file}: expected a container whose opening points along {up}, found that it points along {_named(up, axis)}; "
+                f"write `up: {_named(up, axis)}` into scan.yaml beside it"
+            )
+    return *mesh, {"drains_closed": 0}  # no container at all: the stages that need one say so
 
-    finite = np.isfinite(mesh.vertices).all(axis=1)
-    mesh = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-    mesh.update_faces(finite[mesh.faces].all(axis=1))
-    mesh.remove_unreferenced_vertices()
-    mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    mesh.update_faces(mesh.nondegenerate_faces())
-    mesh.update_faces(mesh.unique_faces())
-    if len(mesh.faces) == 0:
-        raise PipelineError(f"{path}: expected a mesh with faces, found only empty ones; export it again")
-    trimesh.repair.fix_normals(mesh, multibody=True)
-    trimesh.repair.fill_holes(mesh)
-    mesh.remove_unreferenced_vertices()
-    return mesh
+
+def _named(up: str, axis: str) -> str:
+    """Return which axis of the file is `axis` of a frame in which `up` became z."""
+    direction = _rotation(up).T @ _rotation(axis).T[:, 2]
+    k = int(np.argmax(np.abs(direction)))
+    return ("-" if direction[k] < 0 else "") + "xyz"[k]
+
+
+def holds(mesh: Mesh) -> bool:
+    """Return whether an upright mesh (vertices (V, 3), triangles (F, 3)) holds liquid."""
+    try:
+        cavity(*mesh, name="")
+    except PipelineError:
+        return False
+    return True
 
 
 def _check_size(vertices_m: np.ndarray, path: Path) -> None:
@@ -72,12 +98,15 @@ def _check_size(vertices_m: np.ndarray, path: Path) -> None:
         )
 
 
-def _upright(vertices_m: np.ndarray, up: str) -> np.ndarray:
+def _rotation(up: str) -> np.ndarray:
+    """Return the rotation (3, 3) that turns the axis `up` to z."""
+    R = np.roll(np.eye(3), 2 - "xyz".index(up[-1]), axis=0)
+    return np.diag([1.0, -1.0, -1.0]) @ R if up.startswith("-") else R
+
+
+def upright(vertices_m: np.ndarray, up: str) -> np.ndarray:
     """Return T_object_world that turns the axis `up` to z and stands the vertices (V, 3) on z = 0 over the origin."""
-    axis = "xyz".index(up[-1])
-    R = np.roll(np.eye(3), 2 - axis, axis=0)
-    if up.startswith("-"):
-        R = np.diag([1.0, -1.0, -1.0]) @ R
+    R = _rotation(up)
     turned = vertices_m @ R.T
     low, high = turned.min(axis=0), turned.max(axis=0)
     return frames.transform(R, -np.array([*(low + high)[:2] / 2, low[2]]))

@@ -35,9 +35,9 @@ def fused(folder: Path, *, voxel_m: float, truncation_m: float, n_points: int, s
     rng = np.random.default_rng(seed)
     raw = layouts.read(folder)
     if isinstance(raw, layouts.DroppedMesh):
-        vertices, triangles, T_object_world = dropped.read(raw)
+        vertices, triangles, T_object_world, facts = dropped.read(raw, rng)
         surface = tsdf.Surface(vertices, triangles, np.ones(len(vertices), bool))
-        return _result(surface, n_points, _SMOOTH_DROPPED, rng, _mesh_facts(T_object_world, raw))
+        return _result(surface, n_points, _SMOOTH_DROPPED, rng, facts | _mesh_facts(T_object_world, raw))
     scan = recorded.located(raw, str(folder), rng)
     surface = tsdf.fuse(scan.views, scan.placement, voxel_m, truncation_m, str(folder))
     facts = scan.facts() | _residuals(scan, surface, str(folder), rng)
@@ -61,8 +61,13 @@ def _result(
 
 
 def _mesh_facts(T_object_world: np.ndarray, raw: layouts.DroppedMesh) -> dict[str, Any]:
-    facts = {"layout": "mesh", "n_views": 0, "unit_m": raw.options.unit_m or 1.0, "table_plane_world": None}
-    return facts | {"T_object_world": T_object_world.tolist(), "table_rms_m": None, "residual_m": None}
+    facts = {
+        "unit_m": raw.options.unit_m or 1.0,
+        "table_plane_world": None,
+        "table_rms_m": None,
+        "residual_m": None,
+    }
+    return facts | {"T_object_world": T_object_world.tolist()}
 
 
 def _residuals(
