@@ -77,7 +77,7 @@ def cleaned(mesh: Any, file: str) -> Any:
     mesh.update_faces(finite[mesh.faces].all(axis=1))
     mesh.remove_unreferenced_vertices()
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    mesh.update_faces(mesh.nondegenerate_faces())
+    mesh.update_faces(_with_three_corners(mesh))
     mesh.update_faces(mesh.unique_faces())
     for _ in range(FIN_ROUNDS):
         mesh.update_faces(~_fins(mesh))
@@ -85,6 +85,12 @@ def cleaned(mesh: Any, file: str) -> Any:
     if len(mesh.faces) == 0:
         raise PipelineError(f"{file}: expected a mesh with faces, found only empty ones; export it again")
     return mesh
+
+
+def _with_three_corners(mesh: Any) -> np.ndarray:
+    """Return which triangles (F,) have three different corners; thin ones stay, as without them there is a gap."""
+    a, b, c = mesh.faces.T
+    return (a != b) & (b != c) & (c != a)
 
 
 def _fins(mesh: Any) -> np.ndarray:
@@ -123,14 +129,8 @@ def holes(mesh: Any) -> list[Hole]:
     found = []
     for k in range(n):
         own = points[part == k]
-        found.append(
-            Hole(
-                border[part[index[:, 0]] == k],
-                own.mean(axis=0),
-                float(np.linalg.norm(np.ptp(own, axis=0))),
-                float(own[:, 2].max()),
-            )
-        )
+        width = float(np.linalg.norm(np.ptp(own, axis=0)))
+        found.append(Hole(border[part[index[:, 0]] == k], own.mean(axis=0), width, float(own[:, 2].max())))
     return sorted(found, key=lambda hole: -hole.width_m)
 
 
@@ -140,9 +140,9 @@ def _check(found: list[Hole], mesh: Any, file: str) -> None:
     for hole in found:
         at_base = hole.high_m < low[2] + BASE_SHARE * (high[2] - low[2])
         if hole.width_m > LARGEST_HOLE * size and not at_base:
-            x, y, z = 1000 * (hole.centre_m - [0, 0, low[2]])
+            x, y, z = (f"{v:.0f}" for v in 1000 * (hole.centre_m - [0, 0, low[2]]))
             raise PipelineError(
-                f"{file}: expected a closed surface, found a hole {1000 * hole.width_m:.0f} mm wide at ({x:.0f}, {y:.0f}, {z:.0f}) mm "
+                f"{file}: expected a closed surface, found a hole {1000 * hole.width_m:.0f} mm wide at ({x}, {y}, {z}) mm "
                 "of the upright object; close it where you made the mesh"
             )
 
@@ -158,7 +158,7 @@ def _filled(mesh: Any, found: list[Hole]) -> Any:
         np.concatenate([mesh.vertices, middles]), np.concatenate([mesh.faces, *fans]), process=False
     )
     filled.merge_vertices()
-    filled.update_faces(filled.nondegenerate_faces())
+    filled.update_faces(_with_three_corners(filled))
     return filled
 
 
