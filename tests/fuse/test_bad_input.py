@@ -129,7 +129,7 @@ def test_nothing_on_the_table(folder):
 def test_mesh_without_faces(tmp_path):
     (tmp_path / "dots").mkdir()
     trimesh.PointCloud(np.random.default_rng(1).random((50, 3))).export(tmp_path / "dots" / "dots.ply")
-    refused(tmp_path / "dots", "dots.ply", "with faces")
+    refused(tmp_path / "dots", "dots.ply", "found 50")
 
 
 def test_mesh_that_is_none(tmp_path):

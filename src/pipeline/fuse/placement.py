@@ -48,10 +48,12 @@ class Cluster:
         """The middle (2,) of the footprint."""
         return self.bounds_m[:, :2].mean(axis=0)
 
-    def shown(self, T_world_table: np.ndarray, views: Views) -> str:
-        """Return size and place in words, and where in which image it is."""
+    def shown(self, T_world_table: np.ndarray, views: Views | None) -> str:
+        """Return size and place in words: where in which image it is, or in the world of a cloud without images."""
         size = " × ".join(f"{1000 * e:.0f}" for e in np.ptp(self.bounds_m, axis=0))
         place = frames.apply(T_world_table, np.array([*self.centre_m, self.bounds_m[1, 2] / 2]))
+        if views is None:
+            return f"one of {size} mm at ({', '.join(f'{x:.3f}' for x in place)}) m"
         x, y, z = views.intrinsics[0] @ frames.apply(frames.inverse(views.T_world_cameras[0]), place)
         return f"one of {size} mm at pixel ({x / z:.0f}, {y / z:.0f}) of {views.names[0]}"
 
@@ -79,6 +81,21 @@ def find(views: Views, name: str, rng: np.random.Generator) -> tuple[Plane, Plac
     raise failures[0]
 
 
+def on_a_plane(points_m: np.ndarray, name: str, rng: np.random.Generator) -> tuple[Plane, Placement]:
+    """Find the table in a cloud (N, 3) without cameras, and the object on it: on the side where most of the rest is."""
+    points = Points(points_m, np.zeros(len(points_m), int))
+    failure: PipelineError | None = None
+    for plane in table.planes(points_m, points_m.mean(axis=0)[None], name, rng):
+        height = plane.height(points_m)
+        above = points.only((height > ABOVE_M) & (height < LARGEST_M))
+        try:
+            middle = np.median(above.places_m, axis=0) if len(above.view) else points_m[0]
+            return plane, place(points, above, plane, middle, None, name)
+        except NoObject as error:
+            failure = failure or error
+    raise failure or NoObject(f"{name}: expected a table under the object, found none")
+
+
 def _above(points: Points, plane: Plane, views: Views) -> Points:
     """Return what rises out of the table's noise and stays where it is: no hand and no robot's arm."""
     height = plane.height(points.places_m)
@@ -90,7 +107,7 @@ def _above(points: Points, plane: Plane, views: Views) -> Points:
 
 
 def place(
-    points: Points, above: Points, plane: Plane, focus: np.ndarray, views: Views, name: str
+    points: Points, above: Points, plane: Plane, focus: np.ndarray, views: Views | None, name: str
 ) -> Placement:
     """Return where the object stands on the plane: what of the points above it is nearest to the focus (3,)."""
     T_table_world = table_frame(plane)
@@ -200,7 +217,7 @@ def _check_size(cluster: Cluster, name: str) -> None:
 
 
 def _check_alone(
-    found: list[Cluster], middle: np.ndarray, T_world_table: np.ndarray, views: Views, name: str
+    found: list[Cluster], middle: np.ndarray, T_world_table: np.ndarray, views: Views | None, name: str
 ) -> None:
     first = found[0]
     reach = np.linalg.norm(first.centre_m - middle)
