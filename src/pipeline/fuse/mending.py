@@ -72,6 +72,10 @@ def cleaned(mesh: Any, file: str) -> Any:
             f"{file}: expected at most {MOST_TRIANGLES} triangles, found {len(mesh.faces)}; make the mesh coarser"
         )
     vertices = np.asarray(mesh.vertices, float)
+    if len(mesh.faces) and not 0 <= mesh.faces.min() <= mesh.faces.max() < len(vertices):
+        raise PipelineError(
+            f"{file}: expected triangles of its {len(vertices)} vertices, found others; the file is damaged: export it again"
+        )
     finite = np.isfinite(vertices).all(axis=1)
     mesh = trimesh.Trimesh(np.where(finite[:, None], vertices, 0.0), mesh.faces, process=False)
     mesh.update_faces(finite[mesh.faces].all(axis=1))
