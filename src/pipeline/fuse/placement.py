@@ -21,11 +21,14 @@ LARGEST_M = 0.45
 MOST_BELOW = 0.05  # of the points over the footprint may lie more than `BELOW_M` below the table
 BELOW_M = 0.010
 LEAST_POINTS = 300
+LEAST_OF_A_VIEW = 60
 # A second object: this far from the first at most, with this share of its points, in this share of the views.
 SECOND_M, SECOND_POINTS, SECOND_VIEWS = 0.15, 0.15, 0.5
 # A base under the object: its border is flat, it is so many times larger than what stands on it.
 FLAT_M, FLAT_SHARE, BASE_AREAS = 0.004, 0.7, 2.0
 OTHERS = 12  # views that are asked whether they look through a point
+# What is nearer together is one thing; in a single view its own shadow lies between its parts.
+GAP_M, SHADOW_M = 0.016, 0.12
 AROUND_M = 0.15  # the table is fitted again this far around the object: depth cameras bend large planes
 _HITS_OF_NOISE = 3  # stray pixels hit a cell once or twice; a cell of the object is hit by many views
 
@@ -115,8 +118,10 @@ def place(
     middle = frames.apply(T_table_world, focus)[:2]
     near = np.linalg.norm(places[:, :2] - middle, axis=1) < LARGEST_M
     places = places[near]
-    found = _clusters(Points(places, above.view[near]), middle) if len(places) else []
-    if not found or found[0].n < LEAST_POINTS:
+    single = views is not None and len(views.names) == 1
+    gap_m, least = (SHADOW_M, LEAST_OF_A_VIEW) if single else (GAP_M, LEAST_POINTS)
+    found = _clusters(Points(places, above.view[near]), middle, gap_m) if len(places) else []
+    if not found or found[0].n < least:
         raise NoObject(
             f"{name}: expected an object on the table, found {found[0].n if found else 0} points together more than "
             f"{ABOVE_M * 1e3:.0f} mm above it; {CURE} and that the object is in view"
@@ -177,7 +182,7 @@ def table_frame(plane: Plane) -> np.ndarray:
     return frames.transform(R, np.array([0.0, 0.0, plane.offset_m]))
 
 
-def _clusters(points: Points, middle: np.ndarray) -> list[Cluster]:
+def _clusters(points: Points, middle: np.ndarray, gap_m: float) -> list[Cluster]:
     """Return what stands together, seen from above; the most likely object first, then by number of points.
 
     What reaches beyond the circle that was searched is background.
@@ -188,12 +193,14 @@ def _clusters(points: Points, middle: np.ndarray) -> list[Cluster]:
     counts = np.zeros(cells.max(axis=0) + 1, int)
     np.add.at(counts, tuple(cells.T), 1)
     hit = counts > min(_HITS_OF_NOISE, n_views // 3)
-    labels, n = ndimage.label(ndimage.binary_closing(np.pad(hit, 3), iterations=2), np.ones((3, 3)))
-    label = labels[3:-3, 3:-3][tuple(cells.T)]
+    bridged = max(1, round(gap_m / CELL_M / 2))
+    held = np.pad(hit, bridged + 1)
+    labels, n = ndimage.label(ndimage.binary_closing(held, iterations=bridged), np.ones((3, 3)))
+    label = labels[tuple(cells.T + bridged + 1)]
     seen = np.zeros((n + 1, n_views), int)
     np.add.at(seen, (label, points.view), 1)
     found = []
-    for k in np.nonzero(seen.sum(axis=1) >= LEAST_POINTS / 3)[0]:
+    for k in np.nonzero(seen.sum(axis=1) >= LEAST_OF_A_VIEW)[0]:
         mask = label == k
         own = places[mask]
         reach = np.linalg.norm(own[:, :2] - middle, axis=1)
