@@ -81,7 +81,8 @@ def _residuals(
             f"{name}: expected measured points within {LARGEST_RESIDUAL_M * 1e3:g} mm of the fused surface, found half of them "
             f"beyond {median * 1e3:.1f} mm; the poses do not fit the images (camera→world, in metres?)"
         )
-    return {"residual_m": {"median": float(median), "quantile_95": float(high)}}
+    twentieths = np.quantile(residual, np.linspace(0, 1, 21)).tolist()
+    return {"residual_m": {"median": float(median), "quantile_95": float(high), "twentieths": twentieths}}
 
 
 def _distance(surface: tsdf.Surface, points_m: np.ndarray) -> np.ndarray:

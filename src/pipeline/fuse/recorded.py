@@ -42,7 +42,7 @@ class Located:
 
 def located(views: Views, name: str, rng: np.random.Generator) -> Located:
     """Return the views in one world, with the table and the object; a `PipelineError` names the folder and what is wrong."""
-    found = {}
+    found: dict[str, Any] = {}
     if not views.T_world_cameras:
         views, found = registration.registered(views, name, rng)
     views, left_out = agreement.checked(views, name, rng)
