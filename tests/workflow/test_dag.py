@@ -17,13 +17,14 @@ def _each(rule: str, objects=frozenset(OBJECTS)) -> set[str]:
     return {f"{rule} {name}" for name in objects}
 
 
+FUSED = _each("fuse") | _each("draw_scan")
 SIMULATED = _each("simulate_pouring") | _each("simulate_filling") | CLASSIFIED
 WARPED = _each("warp") | _each("parametrise") | ASSEMBLED | CLASSIFIED | {"draw_labels"}
 
 
 def _of_one(name: str) -> set[str]:
     """Return all that follows from the scan of an object that is neither source nor held."""
-    stages = ("fuse", "label", "warp", "parametrise", "simulate_pouring", "simulate_filling")
+    stages = ("fuse", "draw_scan", "label", "warp", "parametrise", "simulate_pouring", "simulate_filling")
     return {f"{stage} {name}" for stage in stages} | ASSEMBLED | CLASSIFIED | {"draw_labels"}
 
 
@@ -73,8 +74,8 @@ def test_one_core_gives_the_same_bytes_as_two(finished, unfinished):
 @pytest.mark.parametrize(
     ("key", "value", "jobs"),
     [
-        ("scan.noise", 0.5, _each("scan") | _each("fuse") | _each("label") | WARPED | SIMULATED),
-        ("fuse.points", 7000, _each("fuse") | _each("label") | WARPED | SIMULATED),
+        ("scan.noise", 0.5, _each("scan") | FUSED | _each("label") | WARPED | SIMULATED),
+        ("fuse.points", 7000, FUSED | _each("label") | WARPED | SIMULATED),
         ("label.ridge", 2.0, _each("label") | WARPED),
         ("warp.k", 2, WARPED),
         ("parametrise.hull_points", 3000, _each("parametrise") | ASSEMBLED | CLASSIFIED),
@@ -118,7 +119,7 @@ def test_two_keys_that_swap_their_values_are_a_change(project):
 @pytest.mark.parametrize(
     ("module", "jobs"),
     [
-        ("scan/camera.py", _each("scan") | _each("fuse") | _each("label") | WARPED | SIMULATED),
+        ("scan/camera.py", _each("scan") | FUSED | _each("label") | WARPED | SIMULATED),
         ("label/features.py", _each("label") | WARPED),
         ("simulate/trials.py", SIMULATED),
         ("classify/regression.py", CLASSIFIED),

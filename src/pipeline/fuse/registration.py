@@ -20,9 +20,11 @@ from pipeline.geometry import frames
 
 TURNS, REFINED = 72, 6
 CAP_M = 0.010  # a point further than this from all others fits nothing
-EDGE_M = 0.004
+EDGE_M = 0.009  # to either side of a pixel: what sticks out further tells turns apart
 FIRST_STEEPNESS = 0.85  # sine of the elevation of the view that the others are fitted to
-ALONG = 0.03  # weight of distances along the surface
+FLAT = 0.004  # costs within this are alike
+GOLDEN = 0.381966  # of a whole turn between views whose turn is free
+ALONG = 0.1  # weight of distances along the surface
 ROBUST_M = 0.002  # residuals beyond count less
 THROUGH_M = 0.008  # a view looks through what is this far in front of what it measures
 COARSE, FINE, MODEL, MOST_MODEL = 300, 1200, 1500, 15_000  # points
@@ -31,7 +33,7 @@ LEAST_VIEWS = 6
 WITNESSES = 8  # views that are asked whether they look through another's points
 VOXEL_M, ROUNDS, STEPS, NEAR_M = 0.002, 5, 4, 0.006  # of the fit to the fused surface
 APART_M, APART_SHARE = 0.010, 0.98  # of an object that differs from itself when it is turned
-MISFIT = 0.1  # weight of distances beside that of contradictions
+MISFIT = 0.03  # weight of distances beside that of contradictions
 MOST_LEFT_OUT = 0.2
 
 
@@ -102,7 +104,7 @@ def _placed(stood: list[Levelled], views: Views, rng: np.random.Generator) -> li
         witnesses = [(stood[j].number, frames.inverse(poses[j] @ stood[j].T_level_camera)) for j in asked]
         share = max(COARSE, MOST_MODEL // len(others))
         model = np.concatenate([_some(stood[j], share, rng).features(poses[j]) for j in others])
-        pose = _best(stood[k], model, Evidence(nearest, views.intrinsics, witnesses), rng)
+        pose = _best(stood[k], k, model, Evidence(nearest, views.intrinsics, witnesses), rng)
         poses = [*poses[:k], pose, *poses[k + 1 :]]
     return poses
 
@@ -132,27 +134,35 @@ class Evidence:
         return own + float(np.mean(others))
 
     def _through(self, number: int, T_camera_world: np.ndarray, features: np.ndarray) -> float:
-        """Return the share of points that face the camera and that it looks through."""
+        """Return the share of points that face the camera, and that it looks through."""
         points = frames.apply(T_camera_world, features[:, :3])
         facing = np.einsum("nc,nc->n", points, frames.rotate(T_camera_world, features[:, 3:6])) < 0
         measured, expected = projected(points, self.intrinsics[number], self.nearest_m[number])
         asked = facing & (measured > 0)
-        return float(np.mean((measured - expected)[asked] > THROUGH_M)) if asked.sum() > 20 else 0.5
+        return float(np.mean(asked & (measured - expected > THROUGH_M)))
 
 
-def _best(view: Levelled, model: np.ndarray, evidence: Evidence, rng: np.random.Generator) -> np.ndarray:
-    """Return T_world_level that fits a view best to the model (M, 7).
+def _best(
+    view: Levelled, k: int, model: np.ndarray, evidence: Evidence, rng: np.random.Generator
+) -> np.ndarray:
+    """Return T_world_level that fits the k-th view best to the model (M, 7).
 
     What counts is what contradicts: parts that only one of them saw are no evidence.
     """
     coarse, fine = (_some(view, n, rng) for n in (COARSE, FINE))
     probe = model[rng.integers(len(model), size=MODEL)]
-    turned = [_turn(2 * np.pi * k / TURNS) for k in range(TURNS)]
+    turned = [_turn(2 * np.pi * i / TURNS) for i in range(TURNS)]
     costs = np.array([evidence.against(coarse, T, probe) for T in turned])
+    free = round(k * GOLDEN * TURNS) % TURNS
+    # Where every turn fits, let the views come from all round.
     lower = (costs <= np.roll(costs, 1)) & (costs <= np.roll(costs, -1))
-    starts = sorted(np.nonzero(lower)[0], key=lambda k: costs[k])[:REFINED]
+    starts = (
+        [free]
+        if costs[free] < costs.min() + FLAT
+        else sorted(np.nonzero(lower)[0], key=lambda i: costs[i])[:REFINED]
+    )
     tree = cKDTree(model)
-    ends = [_icp(fine, turned[k], tree, ITERATIONS) for k in starts]
+    ends = [_icp(fine, turned[i], tree, ITERATIONS) for i in starts]
     return min(ends, key=lambda T: evidence.against(fine, T, probe) + MISFIT * _misfit(fine, T, tree))
 
 

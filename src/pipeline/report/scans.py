@@ -11,7 +11,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 # Azimuth and elevation in degrees, and what the panel is called.
-SIDES = ((-60.0, 25.0, "front"), (120.0, 25.0, "back"), (-60.0, 70.0, "from above"), (-60.0, -35.0, "from below"))
+SIDES = (
+    (-60.0, 25.0, "front"),
+    (120.0, 25.0, "back"),
+    (-60.0, 70.0, "from above"),
+    (-60.0, -35.0, "from below"),
+)
 PIXELS = 260
 SEEN_RGB, UNSEEN_RGB = (0.34, 0.71, 0.91), (0.90, 0.62, 0.0)  # Okabe and Ito's sky blue and orange
 LINE, MARK = "#0072B2", "#D55E00"
@@ -30,7 +35,9 @@ def main() -> None:
 
     cloud = read_table(options.cloud, "cloud")
     name = options.fusion.parent.name
-    figure = draw(name, read_mesh(options.mesh), points(cloud), cloud["seen"].to_numpy(bool), read_json(options.fusion))
+    figure = draw(
+        name, read_mesh(options.mesh), points(cloud), cloud["seen"].to_numpy(bool), read_json(options.fusion)
+    )
     with replacing(options.output) as temporary:
         figure.savefig(temporary, dpi=110, metadata={"Software": None})
 
@@ -80,7 +87,9 @@ def summary(seen: "np.ndarray", facts: dict[str, Any]) -> str:
     return "; ".join(said)
 
 
-def shaded(surface: Any, vertices_m: "np.ndarray", tree: Any, seen: "np.ndarray", azimuth: float, elevation: float):  # type: ignore[no-untyped-def]
+def shaded(
+    surface: Any, vertices_m: "np.ndarray", tree: Any, seen: "np.ndarray", azimuth: float, elevation: float
+):  # type: ignore[no-untyped-def]
     """Return an image (H, W, 3) of the surface in parallel projection, lit from the camera, in the colour of seen or unseen."""
     import numpy as np
 
