@@ -22,8 +22,9 @@ TURNS, REFINED = 72, 6
 CAP_M = 0.010  # a point further than this from all others fits nothing
 EDGE_M = 0.009  # to either side of a pixel: what sticks out further tells turns apart
 FIRST_STEEPNESS = 0.85  # sine of the elevation of the view that the others are fitted to
-FLAT = 0.004  # costs within this are alike
-GOLDEN = 0.381966  # of a whole turn between views whose turn is free
+TOLD = 0.015  # of the points must contradict a wrong turn
+SAME_CAMERA = 0.02  # of its height in metres and the sines of its tilt
+GOLDEN = 0.381966  # of a whole turn
 ALONG = 0.1  # weight of distances along the surface
 ROBUST_M = 0.002  # residuals beyond count less
 THROUGH_M = 0.008  # a view looks through what is this far in front of what it measures
@@ -32,7 +33,6 @@ ITERATIONS, SWEEPS = 12, 10
 LEAST_VIEWS = 6
 WITNESSES = 8  # views that are asked whether they look through another's points
 VOXEL_M, ROUNDS, STEPS, NEAR_M = 0.002, 5, 4, 0.006  # of the fit to the fused surface
-APART_M, APART_SHARE = 0.010, 0.98  # of an object that differs from itself when it is turned
 MISFIT = 0.03  # weight of distances beside that of contradictions
 MOST_LEFT_OUT = 0.2
 
@@ -49,34 +49,25 @@ def registered(views: Views, name: str, rng: np.random.Generator) -> tuple[Views
             "add their poses"
         )
     stood, left_out = _levelled(views, name, rng)
-    poses = _swept(stood, _placed(stood, views, rng), rng)
+    poses, told = _placed(stood, views, rng)
+    poses = _swept(stood, poses, rng)
+    if told < TOLD:
+        poses = _all_round(stood, poses)
     poses = fitted_to_surface(stood, poses, views, name, rng)
-    return _with(views, stood, poses), symmetry(stood, poses) | {"views_without_object": left_out}
+    facts = {"views_without_object": left_out, "roll_observable": told >= TOLD, "roll_evidence": told}
+    return _with(views, stood, poses), facts
 
 
-def symmetry(stood: list[Levelled], poses: list[np.ndarray]) -> dict[str, Any]:
-    """Return whether the object's turn about the vertical could be seen: does it differ from itself when it is turned?
+def _all_round(stood: list[Levelled], poses: list[np.ndarray]) -> list[np.ndarray]:
+    """Return the poses of views of a round object, turned about its axis so that they come from all sides.
 
-    The measure is the distance that all but a few of its points have to the turned object, for the worst turn.
+    Where no view tells turns apart, each is as right from any side, and together they show the whole surface of revolution.
     """
     features = np.concatenate([view.features(T) for view, T in zip(stood, poses, strict=True)])
-    model = features[:: max(1, len(features) // MOST_MODEL)]
-    axis = frames.transform(np.eye(3), np.array([*-_round_axis(model), 0.0]))
-    places = frames.apply(axis, model[:, :3])
-    tree = cKDTree(np.hstack([places, model[:, 3:]]))
-    sample = slice(None, None, max(1, len(model) // FINE))
-    apart = []
-    for k in range(1, TURNS):
-        R = _turn(2 * np.pi * k / TURNS)[:3, :3]
-        turned = np.hstack([places[sample] @ R.T, model[sample, 3:6] @ R.T, model[sample, 6:]])
-        apart.append(float(np.quantile(tree.query(turned)[0], APART_SHARE)))
-    seen = max(apart)
-    return {"roll_observable": bool(seen > APART_M), "roll_evidence_m": seen}
-
-
-def _round_axis(model: np.ndarray) -> np.ndarray:
-    normals = model[:, 3:6] / np.maximum(np.linalg.norm(model[:, 3:6], axis=1, keepdims=True), 1e-12)
-    return axis_of(model[:, :3], normals)
+    normals = features[:, 3:6] / np.maximum(np.linalg.norm(features[:, 3:6], axis=1, keepdims=True), 1e-12)
+    shift = frames.transform(np.eye(3), np.array([*-axis_of(features[:, :3], normals), 0.0]))
+    turns = (frames.inverse(shift) @ _turn(2 * np.pi * GOLDEN * k) @ shift for k in range(len(poses)))
+    return [turn @ T for turn, T in zip(turns, poses, strict=True)]
 
 
 def _levelled(views: Views, name: str, rng: np.random.Generator) -> tuple[list[Levelled], list[str]]:
@@ -94,19 +85,40 @@ def _levelled(views: Views, name: str, rng: np.random.Generator) -> tuple[list[L
     ), list(failures)
 
 
-def _placed(stood: list[Levelled], views: Views, rng: np.random.Generator) -> list[np.ndarray]:
-    """Return T_world_level of each view: one after the other against all before it, then again against all others."""
+def _placed(stood: list[Levelled], views: Views, rng: np.random.Generator) -> tuple[list[np.ndarray], float]:
+    """Return T_world_level of each view: one after the other against all before it, then again against all others.
+
+    And how well turns are told apart: the share of points that the worst turn contradicts, in the middle of the views.
+    """
     nearest = [_nearest(depth, K) for depth, K in zip(views.depths_m, views.intrinsics, strict=True)]
-    poses = [np.eye(4)]
+    poses, told = [np.eye(4)], np.zeros(len(stood))
     for k in [*range(1, len(stood)), *range(1, len(stood))]:
         others = np.array([j for j in range(len(poses)) if j != k])
         asked = rng.choice(others, size=min(len(others), WITNESSES), replace=False)
         witnesses = [(stood[j].number, frames.inverse(poses[j] @ stood[j].T_level_camera)) for j in asked]
         share = max(COARSE, MOST_MODEL // len(others))
         model = np.concatenate([_some(stood[j], share, rng).features(poses[j]) for j in others])
-        pose = _best(stood[k], k, model, Evidence(nearest, views.intrinsics, witnesses), rng)
+        known = _known_turn(stood, poses, k, views.options.turntable_deg)
+        pose, told[k] = _best(stood[k], known, model, Evidence(nearest, views.intrinsics, witnesses), rng)
         poses = [*poses[:k], pose, *poses[k + 1 :]]
-    return poses
+    return poses, float(np.median(told[1:]))
+
+
+def _known_turn(
+    stood: list[Levelled], poses: list[np.ndarray], k: int, angles_deg: tuple[float, ...] | None
+) -> float | None:
+    """Return the turn of the k-th view by the turntable's angle since a view placed before, of a camera that stands alike.
+
+    Angles count anticlockwise, seen from above. None where there are no angles or no such view.
+    """
+    if angles_deg is None:
+        return None
+    for j in range(len(poses)):
+        moved = np.abs(stood[j].T_level_camera[2] - stood[k].T_level_camera[2]).max()
+        if j != k and moved < SAME_CAMERA:
+            turned = angles_deg[stood[k].number] - angles_deg[stood[j].number]
+            return float(np.arctan2(poses[j][1, 0], poses[j][0, 0]) - np.radians(turned))
+    return None
 
 
 def _nearest(depth_m: np.ndarray, K: np.ndarray) -> np.ndarray:
@@ -143,9 +155,9 @@ class Evidence:
 
 
 def _best(
-    view: Levelled, k: int, model: np.ndarray, evidence: Evidence, rng: np.random.Generator
-) -> np.ndarray:
-    """Return T_world_level that fits the k-th view best to the model (M, 7).
+    view: Levelled, known: float | None, model: np.ndarray, evidence: Evidence, rng: np.random.Generator
+) -> tuple[np.ndarray, float]:
+    """Return T_world_level that fits a view best to the model (M, 7), and how well the evidence tells turns apart.
 
     What counts is what contradicts: parts that only one of them saw are no evidence.
     """
@@ -153,17 +165,12 @@ def _best(
     probe = model[rng.integers(len(model), size=MODEL)]
     turned = [_turn(2 * np.pi * i / TURNS) for i in range(TURNS)]
     costs = np.array([evidence.against(coarse, T, probe) for T in turned])
-    free = round(k * GOLDEN * TURNS) % TURNS
-    # Where every turn fits, let the views come from all round.
     lower = (costs <= np.roll(costs, 1)) & (costs <= np.roll(costs, -1))
-    starts = (
-        [free]
-        if costs[free] < costs.min() + FLAT
-        else sorted(np.nonzero(lower)[0], key=lambda i: costs[i])[:REFINED]
-    )
+    starts = [turned[i] for i in sorted(np.nonzero(lower)[0], key=lambda i: costs[i])[:REFINED]]
     tree = cKDTree(model)
-    ends = [_icp(fine, turned[i], tree, ITERATIONS) for i in starts]
-    return min(ends, key=lambda T: evidence.against(fine, T, probe) + MISFIT * _misfit(fine, T, tree))
+    ends = [_icp(fine, T, tree, ITERATIONS) for T in (starts if known is None else [_turn(known)])]
+    best = min(ends, key=lambda T: evidence.against(fine, T, probe) + MISFIT * _misfit(fine, T, tree))
+    return best, float(np.ptp(costs))
 
 
 def _some(view: Levelled, n: int, rng: np.random.Generator) -> Levelled:
