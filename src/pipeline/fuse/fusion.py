@@ -40,6 +40,7 @@ def fused(folder: Path, *, voxel_m: float, truncation_m: float, n_points: int, s
         return _result(surface, n_points, _SMOOTH_DROPPED, rng, facts | _mesh_facts(T_object_world, raw))
     scan = recorded.located(raw, str(folder), rng)
     surface = tsdf.fuse(scan.views, scan.placement, voxel_m, truncation_m, str(folder))
+    recorded.check_registered(scan, surface.vertices_m, surface.seen, str(folder))
     facts = scan.facts() | _residuals(scan, surface, str(folder), rng)
     return _result(surface, n_points, _SMOOTH_FUSED, rng, facts)
 

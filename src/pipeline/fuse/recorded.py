@@ -5,9 +5,13 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.errors import PipelineError
 from pipeline.fuse import agreement, placement, registration
 from pipeline.fuse.raw import Views
 from pipeline.fuse.table import Placement, Plane
+
+
+LEAST_SEEN, LOW_SHARE = 0.85, 0.1  # of the surface higher than this share of the object
 
 
 @dataclass(frozen=True)
@@ -48,3 +52,18 @@ def located(views: Views, name: str, rng: np.random.Generator) -> Located:
     views, left_out = agreement.checked(views, name, rng)
     plane, place = placement.find(views, name, rng)
     return Located(views, plane, place, left_out, found)
+
+
+def check_registered(scan: Located, vertices_m: np.ndarray, seen: np.ndarray, name: str) -> None:
+    """Refuse registered views whose surface, vertices (V, 3) of which some were seen (V,), is not shown from all sides.
+
+    Views that were turned wrongly contradict each other: they leave holes, or what nobody saw.
+    """
+    if not scan.registration:
+        return
+    share = float(seen[vertices_m[:, 2] > LOW_SHARE * vertices_m[:, 2].max()].mean())
+    if share < LEAST_SEEN:
+        raise PipelineError(
+            f"{name}: expected views without poses to show the whole object once they are registered, found {share:.0%} of its "
+            "surface seen; record more views all round and from above, write `turntable_deg:` into scan.yaml, or add poses"
+        )
