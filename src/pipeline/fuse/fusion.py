@@ -77,9 +77,10 @@ def _residuals(
     points = scan.placement.points_m
     residual = _distance(surface, points[rng.integers(len(points), size=_RESIDUAL_POINTS)])
     median, high = np.quantile(residual, [0.5, 0.95])
-    if median > LARGEST_RESIDUAL_M:
+    largest = max(LARGEST_RESIDUAL_M, scan.spread_m)
+    if median > largest:
         raise PipelineError(
-            f"{name}: expected measured points within {LARGEST_RESIDUAL_M * 1e3:g} mm of the fused surface, found half of them "
+            f"{name}: expected measured points within {largest * 1e3:.1f} mm of the fused surface, found half of them "
             f"beyond {median * 1e3:.1f} mm; the poses do not fit the images (camera→world, in metres?)"
         )
     twentieths = np.quantile(residual, np.linspace(0, 1, 21)).tolist()

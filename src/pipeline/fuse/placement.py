@@ -102,11 +102,15 @@ def on_a_plane(points_m: np.ndarray, name: str, rng: np.random.Generator) -> tup
 def _above(points: Points, plane: Plane, views: Views) -> Points:
     """Return what rises out of the table's noise and stays where it is: no hand and no robot's arm."""
     height = plane.height(points.places_m)
-    table_m = height[np.abs(height) < MOST_ABOVE_M]
-    spread = 1.4826 * float(np.median(np.abs(table_m - np.median(table_m)))) if len(table_m) else 0.0
-    least = float(np.clip(ABOVE_SIGMAS * spread, ABOVE_M, MOST_ABOVE_M))
+    least = float(np.clip(ABOVE_SIGMAS * spread_m(height), ABOVE_M, MOST_ABOVE_M))
     above = points.only((height > least) & (height < LARGEST_M))
     return above.only(~agreement.seen_through(above.places_m, views, above.view, OTHERS))
+
+
+def spread_m(height_m: np.ndarray) -> float:
+    """Return the standard deviation of the table's points, from heights (N,) of all: the depth camera's noise."""
+    table_m = height_m[np.abs(height_m) < MOST_ABOVE_M]
+    return 1.4826 * float(np.median(np.abs(table_m - np.median(table_m)))) if len(table_m) else 0.0
 
 
 def place(

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from pipeline.errors import PipelineError
-from pipeline.fuse import agreement, placement, registration
+from pipeline.fuse import agreement, placement, registration, table
 from pipeline.fuse.raw import Views
 from pipeline.fuse.table import Placement, Plane
 
-
+COARSE = 12  # pixels
 LEAST_SEEN, LOW_SHARE = 0.85, 0.1  # of the surface higher than this share of the object
 
 
@@ -25,6 +25,11 @@ class Located:
     left_out: list[str]
     registration: dict[str, Any]
 
+    @property
+    def spread_m(self) -> float:
+        """The noise of depth, from the table."""
+        return placement.spread_m(self.plane.height(table.world_points(self.views, COARSE).places_m))
+
     def facts(self) -> dict[str, Any]:
         """Return what fusion.json says of the scan."""
         views = self.views
@@ -38,6 +43,7 @@ class Located:
             "T_object_world": self.placement.T_object_world.tolist(),
             "table_plane_world": [*self.plane.normal.tolist(), self.plane.offset_m],
             "table_rms_m": self.plane.rms_m,
+            "table_spread_m": self.spread_m,
             "eyes_object_m": eyes,
             "poses": "registered" if self.registration else "given",
             **self.registration,
