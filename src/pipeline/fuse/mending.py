@@ -16,6 +16,7 @@ LARGEST_HOLE = 0.15  # of the size: a wider hole would be a guess
 MOST_SHEET = 0.2  # of the area may be seen from both sides
 SEEN = 0.04  # of the directions from a point lead outside, where it counts as seen
 SAMPLES, DIRECTIONS = 1500, 48
+FURTHEST = 1e6  # of a vertex, in the file's units: what is further is damage
 FIN_ROUNDS = 3  # what is left of double triangles goes layer by layer
 
 
@@ -76,7 +77,7 @@ def cleaned(mesh: Any, file: str) -> Any:
         raise PipelineError(
             f"{file}: expected triangles of its {len(vertices)} vertices, found others; the file is damaged: export it again"
         )
-    finite = np.isfinite(vertices).all(axis=1)
+    finite = (np.abs(vertices) < FURTHEST).all(axis=1)  # NaN is not less
     mesh = trimesh.Trimesh(np.where(finite[:, None], vertices, 0.0), mesh.faces, process=False)
     mesh.update_faces(finite[mesh.faces].all(axis=1))
     mesh.remove_unreferenced_vertices()
