@@ -6,6 +6,7 @@ import pytest
 import trimesh
 
 from pipeline.errors import PipelineError
+from pipeline.fuse import clouds
 from pipeline.fuse.fusion import fused
 from pipeline.geometry import frames
 from pipeline.geometry.cavity import cavity
@@ -17,7 +18,7 @@ OPTIONS = {"voxel_m": 0.001, "truncation_m": 0.002, "n_points": 5000, "seed": 2}
 CUP = shape("espresso_cup")
 
 
-def points(n: int = 15_000, noise_m: float = 0.0001) -> tuple[np.ndarray, np.ndarray]:
+def points(n: int = 9_000, noise_m: float = 0.0001) -> tuple[np.ndarray, np.ndarray]:
     """Return noisy points (M, 3) of the cup without its underside, and their true normals."""
     rng = np.random.default_rng(1)
     places, triangle = uniform_points(CUP.vertices_m, CUP.triangles, n, rng)
@@ -52,7 +53,7 @@ def check(result) -> None:
 
 @pytest.mark.parametrize(
     ("file", "with_normals", "flip"),
-    [("cup.ply", False, 1), ("cup.pcd", True, 1), ("cup.npz", True, -1), ("cup.npz", False, 1)],
+    [("cup.ply", False, 1), ("cup.npz", True, -1)],
 )
 def test_a_cloud_becomes_the_surface(tmp_path, file, with_normals, flip):
     places, normals = points()
@@ -63,9 +64,18 @@ def test_a_cloud_becomes_the_surface(tmp_path, file, with_normals, flip):
     check(result)
 
 
+def test_a_pcd_file_is_read_like_the_others(tmp_path):
+    places, normals = points(3000)
+    write(tmp_path / "cup.pcd", places, normals)
+    found, facing = clouds.read(tmp_path / "cup.pcd")
+    order = np.lexsort(places.T[::-1])
+    np.testing.assert_allclose(found, places[order], atol=1e-6)
+    np.testing.assert_allclose(facing, normals[order], atol=1e-6)
+
+
 def test_a_cloud_with_its_table_on_its_side(tmp_path):
     rng = np.random.default_rng(3)
-    plane = np.column_stack([rng.uniform(-0.2, 0.2, (60_000, 2)), rng.normal(0, 0.0002, 60_000)])
+    plane = np.column_stack([rng.uniform(-0.2, 0.2, (30_000, 2)), rng.normal(0, 0.0002, 30_000)])
     plane = plane[np.linalg.norm(plane[:, :2], axis=1) > 0.026]
     T = frames.transform(frames.rotation_about(np.array([0.6, 0.8, 0.0]), 1.9), np.array([0.3, 0.1, -0.2]))
     write(tmp_path / "cup/cup.npz", frames.apply(T, np.concatenate([points()[0], plane])), None)

@@ -6,7 +6,7 @@
 import pytest
 from fuse import mutations
 
-CASES = 40
+CASES = 30
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ LEAST = 0.4  # of the points that another view could see: right poses reach 0.6 
 LEAST_OF_A_VIEW = 0.2
 MOST_LEFT_OUT = 0.2  # of the views
 NEAREST_M, FURTHEST_M = 0.1, 10.0  # of what stands on a table, from a depth camera
-POINTS, PAIRS = 400, 400
+POINTS, PAIRS = 400, 200
 
 
 @dataclass(frozen=True)
@@ -199,7 +199,7 @@ def _mistakes(name: str, depth_scale: float) -> Iterator[Mistake]:
         100.0,
         4000.0,
         2000.0,
-        *np.geomspace(depth_scale / 8, depth_scale * 8, 121),
+        *np.geomspace(depth_scale / 8, depth_scale * 8, 81),
     ):
         says = f"depths that fit at about {scale:.4g} units per metre"
         yield Mistake(says, f"write `depth_scale: {scale:.4g}` into {file}", lambda T: T, depth_scale / scale)

@@ -14,18 +14,22 @@ from scipy.spatial import cKDTree
 from pipeline.errors import PipelineError
 from pipeline.fuse import placement, tsdf
 from pipeline.fuse.agreement import projected
-from pipeline.fuse.levelled import Levelled, axis_of, level
+from pipeline.fuse.levelled import NORMAL_M, Levelled, axis_of, level
 from pipeline.fuse.raw import Views
 from pipeline.geometry import frames
 
 TURNS, REFINED = 72, 6
 CAP_M = 0.010  # a point further than this from all others fits nothing
-EDGE_M = 0.009  # to either side of a pixel: what sticks out further tells turns apart
+EDGE_M, SURE_EDGE_M = (
+    0.006,
+    0.009,
+)  # to either side of a pixel: to choose a turn, and to say that it can be told
 FIRST_STEEPNESS = 0.85  # sine of the elevation of the view that the others are fitted to
 TOLD = 0.03  # of the points must contradict a wrong turn
 SAME_CAMERA = 0.02  # of its height in metres and the sines of its tilt
 GOLDEN = 0.381966  # of a whole turn
 ALONG = 0.1  # weight of distances along the surface
+ALIKE = 0.5  # cosine between normals of points that are the same
 ROBUST_M = 0.002  # residuals beyond count less
 THROUGH_M = 0.008  # a view looks through what is this far in front of what it measures
 COARSE, FINE, MODEL, MOST_MODEL = 300, 1200, 1500, 15_000  # points
@@ -90,7 +94,8 @@ def _placed(stood: list[Levelled], views: Views, rng: np.random.Generator) -> tu
 
     And how well turns are told apart: the share of points that the worst turn contradicts, in the middle of the views.
     """
-    nearest = [_nearest(depth, K) for depth, K in zip(views.depths_m, views.intrinsics, strict=True)]
+    cameras = list(zip(views.depths_m, views.intrinsics, strict=True))
+    near, sure = ([_nearest(depth, K, edge) for depth, K in cameras] for edge in (EDGE_M, SURE_EDGE_M))
     poses, told = [np.eye(4)], np.zeros(len(stood))
     for k in [*range(1, len(stood)), *range(1, len(stood))]:
         others = np.array([j for j in range(len(poses)) if j != k])
@@ -99,7 +104,8 @@ def _placed(stood: list[Levelled], views: Views, rng: np.random.Generator) -> tu
         share = max(COARSE, MOST_MODEL // len(others))
         model = np.concatenate([_some(stood[j], share, rng).features(poses[j]) for j in others])
         known = _known_turn(stood, poses, k, views.options.turntable_deg)
-        pose, told[k] = _best(stood[k], known, model, Evidence(nearest, views.intrinsics, witnesses), rng)
+        evidence, certain = (Evidence(images, views.intrinsics, witnesses) for images in (near, sure))
+        pose, told[k] = _best(stood[k], known, model, evidence, certain, rng)
         poses = [*poses[:k], pose, *poses[k + 1 :]]
     return poses, float(np.median(told[1:]))
 
@@ -121,10 +127,10 @@ def _known_turn(
     return None
 
 
-def _nearest(depth_m: np.ndarray, K: np.ndarray) -> np.ndarray:
-    """Return the least depth within `EDGE_M` of each pixel (H, W): edges are not that sure."""
+def _nearest(depth_m: np.ndarray, K: np.ndarray, edge_m: float) -> np.ndarray:
+    """Return the least depth within `edge_m` of each pixel (H, W): edges are not that sure."""
     known = depth_m[depth_m > 0]
-    pixels = 1 + 2 * round(EDGE_M * K[0, 0] / float(np.median(known))) if len(known) else 1
+    pixels = 1 + 2 * round(edge_m * K[0, 0] / float(np.median(known))) if len(known) else 1
     least = minimum_filter(np.where(depth_m > 0, depth_m, np.inf), pixels)
     return np.where(np.isfinite(least), least, 0.0)
 
@@ -155,7 +161,12 @@ class Evidence:
 
 
 def _best(
-    view: Levelled, known: float | None, model: np.ndarray, evidence: Evidence, rng: np.random.Generator
+    view: Levelled,
+    known: float | None,
+    model: np.ndarray,
+    evidence: Evidence,
+    sure: Evidence,
+    rng: np.random.Generator,
 ) -> tuple[np.ndarray, float]:
     """Return T_world_level that fits a view best to the model (M, 7), and how well the evidence tells turns apart.
 
@@ -170,7 +181,7 @@ def _best(
     tree = cKDTree(model)
     ends = [_icp(fine, T, tree, ITERATIONS) for T in (starts if known is None else [_turn(known)])]
     best = min(ends, key=lambda T: evidence.against(fine, T, probe) + MISFIT * _misfit(fine, T, tree))
-    return best, float(np.ptp(costs))
+    return best, float(np.ptp([sure.against(coarse, T, probe) for T in turned]))
 
 
 def _some(view: Levelled, n: int, rng: np.random.Generator) -> Levelled:
@@ -196,9 +207,10 @@ def _icp(view: Levelled, T: np.ndarray, tree: cKDTree, iterations: int) -> np.nd
         features = view.features(T)
         distance, index = tree.query(features, distance_upper_bound=CAP_M)
         near = distance < CAP_M
-        there = tree.data[index[near]]
-        n = there[:, 3:6] / np.maximum(np.linalg.norm(there[:, 3:6], axis=1, keepdims=True), 1e-12)
-        step = fitting_step(features[near, :3], there[:, :3], n)
+        here, there = features[near], tree.data[index[near]]
+        # A handle's left half, seen by one view, is not its right half, seen by another.
+        alike = np.einsum("nc,nc->n", here[:, 3:6], there[:, 3:6]) > ALIKE * NORMAL_M**2
+        step = fitting_step(here[alike, :3], there[alike, :3], there[alike, 3:6] / NORMAL_M)
         T = step @ T
         if np.abs(step - np.eye(4)).max() < 1e-5:
             break
@@ -219,10 +231,9 @@ def fitting_step(here: np.ndarray, there: np.ndarray, normals: np.ndarray) -> np
     # The small extra weight holds what the pairs do not determine: the turn of a round cup.
     normal = np.einsum("n,ni,nj->ij", w, A, A) + np.diag([1e-6, 1e-3, 1e-3]) * len(b)
     right = np.einsum("n,ni,n->i", w, A, b)
-    # So do the pairs themselves, a little: of a rim seen from above no plane stands across.
-    for B, offset in ((np.stack([-y, 1 + 0 * y, 0 * y], 1), 0), (np.stack([x, 0 * x, 1 + 0 * x], 1), 1)):
-        normal += ALONG * np.einsum("n,ni,nj->ij", w, B, B)
-        right += ALONG * np.einsum("n,ni,n->i", w, B, (there - here)[:, offset])
+    # So do the pairs themselves, a little, for the shift alone: of a rim seen from above no plane stands across.
+    normal[[1, 2], [1, 2]] += ALONG * w.sum()
+    right[1:] += ALONG * np.einsum("n,nc->c", w, (there - here)[:, :2])
     turn, dx, dy = np.linalg.solve(normal, right)
     return frames.transform(np.eye(3), np.array([dx, dy, 0.0])) @ _turn(turn)
 
@@ -259,7 +270,7 @@ def fitted_to_surface(
                 there, normals = nearest(here)
                 facing = frames.rotate(poses[k], view.normals)
                 near = (np.linalg.norm(there - here, axis=1) < NEAR_M) & (
-                    np.einsum("nc,nc->n", facing, normals) > 0.0
+                    np.einsum("nc,nc->n", facing, normals) > ALIKE
                 )
                 poses[k] = fitting_step(here[near], there[near], normals[near]) @ poses[k]
     return poses
