@@ -52,6 +52,10 @@ class Located:
 
 def located(views: Views, name: str, rng: np.random.Generator) -> Located:
     """Return the views in one world, with the table and the object; a `PipelineError` names the folder and what is wrong."""
+    if views.options.on_table is False:
+        raise PipelineError(
+            f"{name}/scan.yaml: on_table: expected true for depth images, as up comes from the table, found false; remove the key"
+        )
     found: dict[str, Any] = {}
     if not views.T_world_cameras:
         views, found = registration.registered(views, name, rng)
