@@ -16,6 +16,7 @@ rule all:
         "reports/roc.pdf",
         "reports/metrics.json",
         "reports/labels.pdf",
+        each("reports/scans/{object}.png"),
 
 
 include: "workflow/rules/scan.smk"

@@ -52,7 +52,7 @@ def recorded(body: SimpleNamespace, noise: float) -> tuple[Views, Placement]:
     T_world_object = recording.pose_on_table(recording.generator(SEED, body.name, 0))
     pairs = recording.views(body, T_world_object, VIEWS, DISTANCE_M, noise, SEED)
     depths = [(depth_mm / np.float32(1000)).astype(np.float32) for depth_mm, _ in pairs]
-    views = Views(depths, [pose for _, pose in pairs], camera.intrinsics())
+    views = Views(depths, [pose for _, pose in pairs], np.stack([camera.intrinsics()] * len(depths)))
     points, eyes = world_points(views), np.array([pose[:3, 3] for _, pose in pairs])
     plane = table_plane(points, eyes, body.name, np.random.default_rng(SEED))
     return views, place(points, plane, body.name)
@@ -66,7 +66,7 @@ def plain(views: Views, placement: Placement, voxel_m: float, truncation_m: floa
     grid = o3d.t.geometry.VoxelBlockGrid(
         ("tsdf", "weight"), (o3d.core.float32,) * 2, (one, one), voxel_m, tsdf.BLOCK, len(keys)
     )
-    K = views.intrinsics + [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]  # Open3D truncates projected coordinates
+    K = views.intrinsics[0] + [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]  # Open3D truncates projected coordinates
     for depth_m, T_world_camera in zip(views.depths_m, views.T_world_cameras, strict=True):
         depth = np.where(behind_edge(depth_m), 0, depth_m).astype(np.float32)
         image = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(depth)).filter_bilateral(5, 0.004, 1.5)

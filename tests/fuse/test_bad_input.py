@@ -53,7 +53,7 @@ def test_something_else(tmp_path):
     refused(tmp_path / "notes", "readme.doc")
     box(tmp_path / "two" / "a.ply")
     box(tmp_path / "two" / "b.ply")
-    refused(tmp_path / "two", "a.ply, b.ply", "one scan a folder")
+    refused(tmp_path / "two", "a.ply and b.ply", "one scan a folder")
 
 
 def test_no_intrinsics(folder):
@@ -129,7 +129,7 @@ def test_nothing_on_the_table(folder):
 def test_mesh_without_faces(tmp_path):
     (tmp_path / "dots").mkdir()
     trimesh.PointCloud(np.random.default_rng(1).random((50, 3))).export(tmp_path / "dots" / "dots.ply")
-    refused(tmp_path / "dots", "dots.ply", "with faces")
+    refused(tmp_path / "dots", "dots.ply", "found 50")
 
 
 def test_mesh_that_is_none(tmp_path):

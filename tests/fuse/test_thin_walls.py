@@ -43,7 +43,9 @@ def scanned(body: SimpleNamespace, views: int = 36) -> tuple[Views, np.ndarray]:
     T_world_object = recording.pose_on_table(recording.generator(1, body.name, 0))
     pairs = recording.views(body, T_world_object, views, 0.6, 1.0, 1)
     depths = [(depth_mm / np.float32(1000)).astype(np.float32) for depth_mm, _ in pairs]
-    return Views(depths, [pose for _, pose in pairs], camera.intrinsics()), T_world_object
+    return Views(
+        depths, [pose for _, pose in pairs], np.stack([camera.intrinsics()] * len(depths))
+    ), T_world_object
 
 
 def fused(views: Views, truncation_m: float = TRUNCATION_M) -> tuple[tsdf.Surface, np.ndarray]:
@@ -98,7 +100,7 @@ def test_a_truncation_of_ten_walls_changes_little(bowl):
 def without_floor(views: Views, T_world_object: np.ndarray, radius_m: float) -> Views:
     """The same views, but nothing comes back from a disc in the middle of the floor."""
     depths = []
-    K = views.intrinsics
+    K = views.intrinsics[0]
     for depth, T_world_camera in zip(views.depths_m, views.T_world_cameras, strict=True):
         v, u = np.mgrid[: depth.shape[0], : depth.shape[1]]
         rays = np.stack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones(depth.shape)], axis=-1)

@@ -91,7 +91,7 @@ def fresh(tmp_path) -> Project:
 def finished(tmp_path_factory) -> Project:
     """Return the project after one call; shared, so only to be read."""
     project = new_project(tmp_path_factory.mktemp("finished"))
-    told = project.call("reports/roc.pdf", "reports/labels.pdf")
+    told = project.call()
     assert told.returncode == 0, told.stdout
     return project
 

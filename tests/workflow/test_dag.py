@@ -17,6 +17,7 @@ def _each(rule: str, objects=frozenset(OBJECTS)) -> set[str]:
     return {f"{rule} {name}" for name in objects}
 
 
+FUSED = _each("fuse") | _each("draw_scan")
 SIMULATED = _each("simulate_pouring") | _each("simulate_filling") | CLASSIFIED
 CONTAINED = _each("simulate_container") | SIMULATED
 COMPARED = _each("accuracy")
@@ -26,13 +27,8 @@ WARPED = _each("warp") | _each("parametrise") | ASSEMBLED | COMPARED | CLASSIFIE
 def _of_one(name: str) -> set[str]:
     """Return all that follows from the scan of an object that is neither source nor held."""
     stages = (
-        "fuse",
-        "label",
-        "warp",
-        "parametrise",
-        "simulate_container",
-        "simulate_pouring",
-        "simulate_filling",
+        *("fuse", "draw_scan", "label", "warp", "parametrise"),
+        *("simulate_container", "simulate_pouring", "simulate_filling"),
     )
     return {f"{stage} {name}" for stage in stages} | ASSEMBLED | CLASSIFIED | {"draw_labels"}
 
@@ -83,8 +79,8 @@ def test_one_core_gives_the_same_bytes_as_two(finished, unfinished):
 @pytest.mark.parametrize(
     ("key", "value", "jobs"),
     [
-        ("scan.noise", 0.5, _each("scan") | _each("fuse") | _each("label") | WARPED | CONTAINED),
-        ("fuse.points", 7000, _each("fuse") | _each("label") | WARPED | CONTAINED),
+        ("scan.noise", 0.5, _each("scan") | FUSED | _each("label") | WARPED | CONTAINED),
+        ("fuse.points", 7000, FUSED | _each("label") | WARPED | CONTAINED),
         ("label.ridge", 2.0, _each("label") | WARPED),
         ("warp.k", 2, WARPED),
         ("parametrise.hull_points", 3000, _each("parametrise") | ASSEMBLED | CLASSIFIED | COMPARED),
@@ -132,7 +128,7 @@ def test_two_keys_that_swap_their_values_are_a_change(project):
 @pytest.mark.parametrize(
     ("module", "jobs"),
     [
-        ("scan/camera.py", _each("scan") | _each("fuse") | _each("label") | WARPED | CONTAINED),
+        ("scan/camera.py", _each("scan") | FUSED | _each("label") | WARPED | CONTAINED),
         ("label/features.py", _each("label") | WARPED),
         ("simulate/trials.py", SIMULATED),
         ("simulate/fields.py", CONTAINED),

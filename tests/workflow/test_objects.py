@@ -58,3 +58,20 @@ def test_files_follow_links_and_skip_hidden_ones(tmp_path):
         (tmp_path / "cup" / name).touch()
     (tmp_path / "cup/depth").symlink_to(tmp_path / "elsewhere")
     assert files(tmp_path / "cup") == [f"{tmp_path}/cup/a.txt", f"{tmp_path}/cup/depth/b.png"]
+
+
+def test_links_that_lead_round_or_nowhere(tmp_path):
+    (tmp_path / "cup").mkdir()
+    (tmp_path / "cup/a.txt").touch()
+    (tmp_path / "cup/again").symlink_to(tmp_path / "cup")
+    assert files(tmp_path / "cup") == [f"{tmp_path}/cup/a.txt"]
+    (tmp_path / "cup/b.ply").symlink_to(tmp_path / "nothing")
+    with pytest.raises(PipelineError, match=r"cup/b.ply: expected a file, found a link to nothing"):
+        find(tmp_path, _config())
+
+
+def test_a_file_name_that_no_one_can_print(tmp_path):
+    (tmp_path / "cup").mkdir()
+    (tmp_path / "cup/a\nb.ply").touch()
+    with pytest.raises(PipelineError, match="printable"):
+        find(tmp_path, _config())

@@ -1,6 +1,6 @@
 # Needs everything in data/raw/<object>/.
 # Makes fuse/<object>/: mesh.ply and cloud.parquet, the object's surface upright on z = 0, and fusion.json, how that came about.
-# How: the layout is recognised, the table removed, the views fused, the surface sampled.
+# How: the layout is recognised, poses are checked or found, the table removed, the views fused, the surface sampled.
 
 
 def raw_files(wildcards):

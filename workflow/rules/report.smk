@@ -1,6 +1,7 @@
 # Needs the curves and scores of both experiments; for the numbers also what every stage made, and the demonstration objects' truth.
 # Makes report/accuracy/<object>.json, a demonstration object's errors against its truth.
 # Makes reports/roc.pdf (the paper's Fig. 3) with reports/metrics.json (every headline number), and reports/labels.pdf (Fig. 2);
+#       reports/scans/<object>.png, a page on each scan;
 #       when asked for, reports/physics.pdf and reports/physics.json, the liquid against hydrostatics and against Bullet's spheres.
 # How: one module a figure; truth is compared here and nowhere else.
 
@@ -84,6 +85,23 @@ OTHER_TRIALS = {
     )
     for engine in OTHER_ENGINES
 }
+
+
+rule draw_scan:
+    input:
+        mesh=rules.fuse.output.mesh,
+        cloud=rules.fuse.output.cloud,
+        fusion=rules.fuse.output.report,
+    output:
+        page=f"{REPORTS}/scans/{{object}}.png",
+    log:
+        "logs/report/scans/{object}.log",
+    threads: 1
+    params:
+        code=code("pipeline.report.scans"),
+    shell:
+        "python -m pipeline.report.scans --mesh {input.mesh:q} --cloud {input.cloud:q} --fusion {input.fusion:q}"
+        " --output {output.page:q} > {log:q} 2>&1"
 
 
 rule report_physics:

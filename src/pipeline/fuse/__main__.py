@@ -20,15 +20,13 @@ def main() -> None:
     options.add_argument("--seed", type=int, default=2)
     o = options.parse_args()
 
-    from pipeline import artefacts
+    from pipeline.fuse import outputs
     from pipeline.fuse.fusion import fused
 
     result = fused(o.raw, voxel_m=o.voxel_m, truncation_m=o.truncation_m, n_points=o.points, seed=o.seed)
     for complaint in result.complaints:
         say(f"{o.raw}: {complaint}")
-    artefacts.write_mesh(o.mesh, result.mesh)
-    artefacts.write_table(o.cloud, result.cloud, "cloud")
-    artefacts.write_json(o.report, result.report)
+    outputs.write(result, o.mesh, o.cloud, o.report)
 
 
 run(main)

@@ -1,37 +1,107 @@
-"""A mesh that a user dropped: read, repaired, put upright on z = 0."""
+"""A mesh or a point cloud that a user dropped: read, repaired, put upright on z = 0."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from pipeline.errors import PipelineError
-from pipeline.fuse.layouts import DroppedMesh
+from pipeline.fuse import clouds, drains, mending, standing
+from pipeline.fuse.raw import UPS, DroppedMesh
+from pipeline.fuse.wrapping import Mesh, wrapped
 from pipeline.geometry import frames
+from pipeline.geometry.cavity import cavity
+from pipeline.geometry.sampling import uniform_points
 
 LARGEST_M, SMALLEST_M = 2.0, 0.005
+CLOUDS = (".pcd", ".npz")
+TABLE_SAMPLES = 100_000
 
 
-def read(dropped: DroppedMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return vertices (V, 3) in metres, object frame, triangles (F, 3) oriented outwards, and T_object_world.
+def read(
+    dropped: DroppedMesh, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+    """Return vertices (V, 3) in metres, object frame, triangles (F, 3) oriented outwards, T_object_world and what was done.
 
     The world is the file's own frame in metres. The mesh stands with its lowest point on z = 0, over the origin.
     """
-    mesh = _repaired(_load(dropped.path), dropped.path)
-    world = np.asarray(mesh.vertices, float) * dropped.options.unit_m
-    _check_size(world, dropped.path)
-    T_object_world = _upright(world, dropped.options.up)
-    return frames.apply(T_object_world, world), np.asarray(mesh.faces, np.int64), T_object_world
+    mesh = None if dropped.path.suffix.lower() in CLOUDS else _load(dropped.path)
+    if mesh is None:
+        (vertices, triangles), T_object_world, facts = _from_points(dropped, rng)
+    else:
+        (vertices, triangles), T_object_world, facts = _from_mesh(mesh, dropped, rng)
+    T_stood = upright(vertices, "z")
+    return frames.apply(T_stood, vertices), triangles, T_stood @ T_object_world, facts
 
 
-def _load(path: Path):  # type: ignore[no-untyped-def]
+def _from_mesh(
+    mesh: Any, dropped: DroppedMesh, rng: np.random.Generator
+) -> tuple[Mesh, np.ndarray, dict[str, Any]]:
+    file, options = str(dropped.path), dropped.options
+    mesh.vertices = np.asarray(mesh.vertices, float) * (options.unit_m or 1.0)
+    mesh = mending.cleaned(mesh, file)
+    _check_size(mesh.vertices, dropped.path)
+    up = options.up or "z"
+    T_object_world = upright(mesh.vertices, up)
+    if options.on_table:
+        sample, _ = uniform_points(*mending.arrays(mesh), TABLE_SAMPLES, rng)
+        place = standing.found(sample, True, file, rng)
+        if place is not None:
+            mesh.update_faces(standing.belongs(np.asarray(mesh.vertices), place)[mesh.faces].all(axis=1))
+            T_object_world, up = place.T_object_world, "z"
+    mesh.vertices = frames.apply(T_object_world, mesh.vertices)
+    mesh = mending.cleaned(mesh, file)
+    whole, facts = mending.mended(mesh, options.wall_m, file, rng)
+    whole, done = _holding(whole, up, file)
+    return whole, T_object_world, {"layout": "mesh", "n_views": 0, "mended": facts | done}
+
+
+def _from_points(dropped: DroppedMesh, rng: np.random.Generator) -> tuple[Mesh, np.ndarray, dict[str, Any]]:
+    import trimesh
+
+    file, options = str(dropped.path), dropped.options
+    points, normals = clouds.read(dropped.path)
+    points = points * (options.unit_m or 1.0)
+    _check_size(points, dropped.path)
+    up, place = options.up or "z", standing.found(points, options.on_table, file, rng)
+    T_object_world = upright(points, up)
+    if place is not None:
+        own = standing.belongs(points, place)
+        points, normals = points[own], None if normals is None else normals[own]
+        T_object_world, up = place.T_object_world, "z"
+    points = frames.apply(T_object_world, points)
+    normals = None if normals is None else frames.rotate(T_object_world, normals)
+    surface, found = clouds.meshed(points, normals, file)
+    try:
+        mesh = mending.cleaned(trimesh.Trimesh(*surface, process=False), file)
+        whole, facts = mending.mended(mesh, None, file, rng)
+        whole, done = _holding(whole, up, file)
+        sound = holds(whole)
+    except PipelineError as error:
+        if "`up:" in str(error):
+            raise
+        sound = False
+    if not sound:
+        raise PipelineError(
+            f"{file}: expected points of a container, found a surface through them that is not closed or holds no liquid "
+            f"(points every {found['spacing_m'] * 1e3:.1f} mm); scan it more closely, the inside as well"
+        )
+    facts = {"layout": "cloud", "n_views": 0, "cloud": found, "mended": facts | done}
+    return whole, T_object_world, facts | {"table_cut_away": place is not None}
+
+
+def _load(path: Path) -> Any:
+    """Return the mesh, or None when the file holds points without faces."""
     import trimesh
 
     try:
-        mesh = trimesh.load(path, force="mesh", process=False)
+        mesh = trimesh.load(path, force="mesh" if path.suffix.lower() != ".ply" else None, process=False)
     except Exception as error:  # each reader of trimesh has errors of its own
         raise PipelineError(
-            f"{path}: expected a mesh, but it cannot be read: {error}; export it again"
+            f"{path}: expected a mesh, but it cannot be read: {' '.join(str(error).split()):.200}; export it again"
         ) from error
+    if isinstance(mesh, trimesh.PointCloud):
+        return None
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
         raise PipelineError(
             f"{path}: expected a mesh with faces, found none; export the surface, not its points"
@@ -39,23 +109,37 @@ def _load(path: Path):  # type: ignore[no-untyped-def]
     return mesh
 
 
-def _repaired(mesh, path: Path):  # type: ignore[no-untyped-def]
-    """Merge equal vertices, drop empty and double faces, wind faces alike and outwards."""
-    import trimesh
+def _holding(mesh: Mesh, up: str, file: str) -> tuple[Mesh, dict[str, Any]]:
+    """Return the mesh with small holes closed if it leaks; refuse it when its opening points elsewhere."""
+    if holds(mesh):
+        return mesh, {"drains_closed": 0}
+    field, n = drains.plugged(wrapped(*mesh))
+    if n and holds(field.surface()):
+        return field.surface(), {"drains_closed": n, "remeshed": True}
+    turned = {other: frames.apply(upright(mesh[0], other), mesh[0]) for other in UPS if other != "z"}
+    for axis, vertices in turned.items():
+        if holds((vertices, mesh[1])):
+            raise PipelineError(
+                f"{file}: expected a container whose opening points along {up}, found that it points along {_named(up, axis)}; "
+                f"write `up: {_named(up, axis)}` into scan.yaml beside it"
+            )
+    return mesh, {"drains_closed": 0}  # no container at all: the stages that need one say so
 
-    finite = np.isfinite(mesh.vertices).all(axis=1)
-    mesh = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-    mesh.update_faces(finite[mesh.faces].all(axis=1))
-    mesh.remove_unreferenced_vertices()
-    mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    mesh.update_faces(mesh.nondegenerate_faces())
-    mesh.update_faces(mesh.unique_faces())
-    if len(mesh.faces) == 0:
-        raise PipelineError(f"{path}: expected a mesh with faces, found only empty ones; export it again")
-    trimesh.repair.fix_normals(mesh, multibody=True)
-    trimesh.repair.fill_holes(mesh)
-    mesh.remove_unreferenced_vertices()
-    return mesh
+
+def _named(up: str, axis: str) -> str:
+    """Return which axis of the file is `axis` of a frame in which `up` became z."""
+    direction = _rotation(up).T @ _rotation(axis).T[:, 2]
+    k = int(np.argmax(np.abs(direction)))
+    return ("-" if direction[k] < 0 else "") + "xyz"[k]
+
+
+def holds(mesh: Mesh) -> bool:
+    """Return whether an upright mesh (vertices (V, 3), triangles (F, 3)) holds liquid."""
+    try:
+        cavity(*mesh, name="")
+    except PipelineError:
+        return False
+    return True
 
 
 def _check_size(vertices_m: np.ndarray, path: Path) -> None:
@@ -72,12 +156,15 @@ def _check_size(vertices_m: np.ndarray, path: Path) -> None:
         )
 
 
-def _upright(vertices_m: np.ndarray, up: str) -> np.ndarray:
+def _rotation(up: str) -> np.ndarray:
+    """Return the rotation (3, 3) that turns the axis `up` to z."""
+    R = np.roll(np.eye(3), 2 - "xyz".index(up[-1]), axis=0)
+    return np.diag([1.0, -1.0, -1.0]) @ R if up.startswith("-") else R
+
+
+def upright(vertices_m: np.ndarray, up: str) -> np.ndarray:
     """Return T_object_world that turns the axis `up` to z and stands the vertices (V, 3) on z = 0 over the origin."""
-    axis = "xyz".index(up[-1])
-    R = np.roll(np.eye(3), 2 - axis, axis=0)
-    if up.startswith("-"):
-        R = np.diag([1.0, -1.0, -1.0]) @ R
+    R = _rotation(up)
     turned = vertices_m @ R.T
     low, high = turned.min(axis=0), turned.max(axis=0)
     return frames.transform(R, -np.array([*(low + high)[:2] / 2, low[2]]))

@@ -9,7 +9,7 @@ import pandas as pd
 
 from pipeline.artefacts import Mesh
 from pipeline.errors import PipelineError
-from pipeline.fuse import coverage, dropped, layouts, table, tsdf
+from pipeline.fuse import coverage, dropped, layouts, recorded, tsdf
 from pipeline.fuse.cloud import cloud
 
 LEAST_POINTS = 5000
@@ -39,17 +39,15 @@ def fused(folder: Path, *, voxel_m: float, truncation_m: float, n_points: int, s
     rng = np.random.default_rng(seed)
     raw = layouts.read(folder)
     if isinstance(raw, layouts.DroppedMesh):
-        vertices, triangles, T_object_world = dropped.read(raw)
+        vertices, triangles, T_object_world, facts = dropped.read(raw, rng)
         every = np.ones(len(vertices), bool)
         surface = tsdf.Surface(vertices, triangles, every, ~every)
-        return _result(surface, n_points, _SMOOTH_DROPPED, rng, _mesh_facts(T_object_world, raw))
-    points = table.world_points(raw)
-    eyes = np.array([T[:3, 3] for T in raw.T_world_cameras])
-    plane = table.table_plane(points, eyes, str(folder), rng)
-    placement = table.place(points, plane, str(folder))
-    surface = tsdf.fuse(raw, placement, voxel_m, truncation_m, str(folder))
-    facts = _scan_facts(raw, plane, placement, surface, str(folder), rng)
+        return _result(surface, n_points, _SMOOTH_DROPPED, rng, facts | _mesh_facts(T_object_world, raw))
+    scan = recorded.located(raw, str(folder), rng)
+    surface = tsdf.fuse(scan.views, scan.placement, voxel_m, truncation_m, str(folder))
+    recorded.check_registered(scan, surface.vertices_m, surface.seen, str(folder))
     shares = coverage.shares_seen(surface)
+    facts = scan.facts() | _residuals(scan, surface, str(folder), rng)
     facts |= {"seen": shares, "floor_closed_by_table_m2": surface.table_closed_m2}
     return replace(
         _result(surface, n_points, _SMOOTH_FUSED, rng, facts), complaints=tuple(coverage.complaints(shares))
@@ -73,35 +71,29 @@ def _result(
 
 
 def _mesh_facts(T_object_world: np.ndarray, raw: layouts.DroppedMesh) -> dict[str, Any]:
-    facts = {"layout": "mesh", "n_views": 0, "unit_m": raw.options.unit_m, "table_plane_world": None}
-    return facts | {"T_object_world": T_object_world.tolist(), "table_rms_m": None, "residual_m": None}
+    facts = {
+        "unit_m": raw.options.unit_m or 1.0,
+        "table_plane_world": None,
+        "table_rms_m": None,
+        "residual_m": None,
+    }
+    return facts | {"T_object_world": T_object_world.tolist()}
 
 
-def _scan_facts(
-    views: layouts.Views,
-    plane: table.Plane,
-    placement: table.Placement,
-    surface: tsdf.Surface,
-    name: str,
-    rng: np.random.Generator,
+def _residuals(
+    scan: recorded.Located, surface: tsdf.Surface, name: str, rng: np.random.Generator
 ) -> dict[str, Any]:
-    measured = placement.points_m[rng.integers(len(placement.points_m), size=_RESIDUAL_POINTS)]
-    residual = _distance(surface, measured)
+    points = scan.placement.points_m
+    residual = _distance(surface, points[rng.integers(len(points), size=_RESIDUAL_POINTS)])
     median, high = np.quantile(residual, [0.5, 0.95])
-    if median > LARGEST_RESIDUAL_M:
+    largest = max(LARGEST_RESIDUAL_M, scan.spread_m)
+    if median > largest:
         raise PipelineError(
-            f"{name}: expected measured points within {LARGEST_RESIDUAL_M * 1e3:g} mm of the fused surface, found half of them "
+            f"{name}: expected measured points within {largest * 1e3:.1f} mm of the fused surface, found half of them "
             f"beyond {median * 1e3:.1f} mm; the poses do not fit the images (camera→world, in metres?)"
         )
-    return {
-        "layout": "7-scenes",
-        "n_views": len(views.depths_m),
-        "unit_m": 1.0,
-        "T_object_world": placement.T_object_world.tolist(),
-        "table_plane_world": [*plane.normal.tolist(), plane.offset_m],
-        "table_rms_m": plane.rms_m,
-        "residual_m": {"median": float(median), "quantile_95": float(high)},
-    }
+    twentieths = np.quantile(residual, np.linspace(0, 1, 21)).tolist()
+    return {"residual_m": {"median": float(median), "quantile_95": float(high), "twentieths": twentieths}}
 
 
 def _distance(surface: tsdf.Surface, points_m: np.ndarray) -> np.ndarray:

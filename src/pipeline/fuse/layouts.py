@@ -1,167 +1,102 @@
-"""What lies in data/raw/<object>/: depth images with poses in 7-Scenes layout, or one mesh; recognised by content."""
+"""Which layout lies in data/raw/<object>/, recognised by content, and its reading."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from pipeline.errors import PipelineError
+from pipeline.fuse import files, raw
+from pipeline.fuse.raw import DroppedMesh, Options, Views
+from pipeline.fuse.recordings import bop, open3d_folders, seven_scenes, tum
+from pipeline.fuse.recordings.frame import Frame
+
+__all__ = ["DroppedMesh", "Options", "Views", "read"]
 
 MESHES = (".ply", ".obj", ".stl", ".glb", ".off")
-UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-UPS = ("x", "y", "z", "-x", "-y", "-z")
-RIGID_TOLERANCE = 1e-3  # of R Rᵀ = 1: poses are often written with few digits
+CLOUDS = (".pcd", ".npz")
+RECORDINGS = {"7-scenes": seven_scenes, "open3d": open3d_folders, "tum": tum, "bop": bop}
+MOST_VIEWS = 200
 _EXPECTED = (
-    "frame-NNNNNN.depth.png with frame-NNNNNN.pose.txt and camera-intrinsics.txt, or one mesh "
-    + " ".join(MESHES)
+    "depth images (frame-NNNNNN.depth.png with frame-NNNNNN.pose.txt and camera-intrinsics.txt, or a folder of Open3D, TUM "
+    f"or BOP), one mesh {' '.join(MESHES)}, or one point cloud .ply {' '.join(CLOUDS)}"
 )
-
-
-@dataclass(frozen=True)
-class Options:
-    """What scan.yaml says: the mesh's unit in metres, its up axis, and depth units per metre."""
-
-    unit_m: float = 1.0
-    up: str = "z"
-    depth_scale: float = 1000.0
-
-
-@dataclass(frozen=True)
-class Views:
-    """Depth images (H, W) float32 in metres, 0 where unknown, their poses T_world_camera (4, 4), intrinsics (3, 3)."""
-
-    depths_m: list[np.ndarray]
-    T_world_cameras: list[np.ndarray]
-    intrinsics: np.ndarray
-
-
-@dataclass(frozen=True)
-class DroppedMesh:
-    """A file with the whole surface, in its own units and axes."""
-
-    path: Path
-    options: Options
 
 
 def read(folder: Path) -> Views | DroppedMesh:
     """Read a raw folder; a `PipelineError` names the folder or file, what was found and what was expected."""
-    names = sorted(p.name for p in folder.iterdir() if not p.name.startswith(".")) if folder.is_dir() else []
+    names = _names(folder)
     if not names:
         raise PipelineError(
             f"{folder}: expected {_EXPECTED}; found nothing; add the scan or remove the folder"
         )
-    options = _options(folder / "scan.yaml")
-    depths = [name for name in names if name.endswith(".depth.png")]
-    meshes = [name for name in names if Path(name).suffix.lower() in MESHES]
-    if depths and not meshes:
-        return _seven_scenes(folder, depths, options)
-    if len(meshes) == 1 and not depths:
-        return DroppedMesh(folder / meshes[0], options)
+    options = raw.options(folder / "scan.yaml")
+    layouts = [layout for layout, module in RECORDINGS.items() if module.recognised(folder, names)]
+    dropped = [name for name in names if Path(name).suffix.lower() in MESHES + CLOUDS]
+    if len(layouts) == 1 and not dropped:
+        return _views(folder, layouts[0], names, options)
+    if len(dropped) == 1 and not layouts:
+        return DroppedMesh(folder / dropped[0], options)
     shown = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+    if layouts or dropped:
+        both = [f"images ({layout})" for layout in layouts] + dropped
+        shown = f"{' and '.join(both[:4])}: more than one scan"
     raise PipelineError(f"{folder}: expected {_EXPECTED}; found {shown}; keep one scan a folder")
 
 
-def _options(path: Path) -> Options:
-    import yaml
-
-    if not path.exists():
-        return Options()
+def _names(folder: Path) -> list[str]:
     try:
-        content = yaml.safe_load(path.read_text()) or {}
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        return (
+            sorted(p.name for p in folder.iterdir() if not p.name.startswith(".")) if folder.is_dir() else []
+        )
+    except OSError as error:
         raise PipelineError(
-            f"{path}: expected YAML, but it cannot be read: {' '.join(str(error).split())}"
+            f"{folder}: expected a folder that can be read, found: {error}; mend it"
         ) from error
-    if not isinstance(content, dict):
+
+
+def _views(folder: Path, layout: str, names: list[str], options: Options) -> Views:
+    frames = RECORDINGS[layout].frames(folder, names, options)
+    kept = np.unique(np.linspace(0, len(frames) - 1, min(len(frames), MOST_VIEWS)).round().astype(int))
+    chosen = [frames[i] for i in kept]
+    images = [files.depth(frame.depth, frame.depth_scale, frame.K, frame.where_K) for frame in chosen]
+    if not any(depth.any() for depth, _ in images):
         raise PipelineError(
-            f"{path}: expected keys and values like `units: mm`, found {content!r}; correct it"
+            f"{folder}: expected depth in the images, found zeros in all {len(images)}; record it again"
         )
-    unknown = sorted(str(key) for key in set(content) - {"units", "up", "depth_scale", "notes"})
-    if unknown:
+    poses = [frame.T_world_camera for frame in chosen if frame.T_world_camera is not None]
+    return Views(
+        depths_m=[depth for depth, _ in images],
+        T_world_cameras=poses,
+        intrinsics=np.stack([K for _, K in images]),
+        names=[str(frame.depth.relative_to(folder)) for frame in chosen],
+        layout=layout,
+        options=_for(options, kept, len(frames), folder),
+        colours=[] if poses else _colours(chosen, images),
+        depth_scale=chosen[0].depth_scale,
+        n_found=len(frames),
+    )
+
+
+def _for(options: Options, kept: np.ndarray, n: int, folder: Path) -> Options:
+    """Return the options with the table's angles of the views that were kept."""
+    from dataclasses import replace
+
+    angles = options.turntable_deg
+    if angles is None:
+        return options
+    if len(angles) != n:
         raise PipelineError(
-            f"{path}: expected the keys units, up, depth_scale, notes; found {', '.join(unknown)}; remove it"
+            f"{folder / 'scan.yaml'}: turntable_deg: expected an angle for each of the {n} views, found {len(angles)}; correct it"
         )
-    units, up, scale = content.get("units", "m"), content.get("up", "z"), content.get("depth_scale", 1000.0)
-    if units not in UNITS_M:
-        raise PipelineError(
-            f"{path}: units: expected one of {' '.join(UNITS_M)}, found {units!r}; correct it"
-        )
-    if up not in UPS:
-        raise PipelineError(f"{path}: up: expected one of {' '.join(UPS)}, found {up!r}; correct it")
-    if isinstance(scale, bool) or not isinstance(scale, int | float) or not 0 < scale < np.inf:
-        raise PipelineError(
-            f"{path}: depth_scale: expected depth units per metre (1000 for mm), found {scale!r}; correct it"
-        )
-    return Options(UNITS_M[units], up, float(scale))
+    return replace(options, turntable_deg=tuple(angles[i] for i in kept))
 
 
-def _seven_scenes(folder: Path, names: list[str], options: Options) -> Views:
-    intrinsics = _intrinsics(folder / "camera-intrinsics.txt")
-    depths, poses = [], []
-    for name in names:
-        poses.append(_pose(folder / name.replace(".depth.png", ".pose.txt")))
-        depths.append(_depth(folder / name, options.depth_scale))
-    if not any(depth.any() for depth in depths):
-        raise PipelineError(
-            f"{folder}: expected depth in the images, found zeros in all {len(names)}; record it again"
-        )
-    return Views(depths, poses, intrinsics)
-
-
-def _matrix(path: Path, size: int, what: str) -> np.ndarray:
-    if not path.is_file():
-        raise PipelineError(f"{path}: expected {what} ({size}×{size} numbers), found no such file; add it")
-    try:
-        rows = [line.replace(",", " ").split() for line in path.read_text().splitlines() if line.strip()]
-        matrix = np.array([[float(word) for word in row] for row in rows])
-    except (OSError, ValueError) as error:
-        raise PipelineError(
-            f"{path}: expected {what} ({size}×{size} numbers), found other text; correct it"
-        ) from error
-    if matrix.shape != (size, size) or not np.isfinite(matrix).all():
-        raise PipelineError(
-            f"{path}: expected {what}, {size}×{size} finite numbers, found shape {matrix.shape} "
-            f"with {int((~np.isfinite(matrix)).sum())} not finite; correct it or remove the frame"
-        )
-    return matrix
-
-
-def _intrinsics(path: Path) -> np.ndarray:
-    K = _matrix(path, 3, "the camera's intrinsics")
-    if K[0, 0] <= 0 or K[1, 1] <= 0 or not np.allclose(K[2], [0, 0, 1]):
-        raise PipelineError(
-            f"{path}: expected fx 0 cx / 0 fy cy / 0 0 1 in pixels, found {K.tolist()}; correct it"
-        )
-    return K
-
-
-def _pose(path: Path) -> np.ndarray:
-    T = _matrix(path, 4, "the pose camera→world")
-    R = T[:3, :3]
-    off = np.abs(R @ R.T - np.eye(3)).max()
-    if off > RIGID_TOLERANCE or np.linalg.det(R) < 0 or not np.allclose(T[3], [0, 0, 0, 1], atol=1e-6):
-        raise PipelineError(
-            f"{path}: expected a rigid pose camera→world (rotation, translation in metres, last row 0 0 0 1), found one "
-            f"off by {off:.2g} with determinant {np.linalg.det(R):.3g}; correct it or remove the frame"
-        )
-    u, _, vt = np.linalg.svd(R)
-    T[:3, :3] = u @ vt
-    return T
-
-
-def _depth(path: Path, depth_scale: float) -> np.ndarray:
-    from PIL import Image
-
-    try:
-        with Image.open(path) as image:
-            mode = image.mode
-            values = np.asarray(image)
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        raise PipelineError(
-            f"{path}: expected a 16-bit PNG, but it cannot be read ({error}); record it again"
-        ) from error
-    if mode not in ("I;16", "I;16B", "I") or values.ndim != 2:
-        raise PipelineError(
-            f"{path}: expected a 16-bit depth image of one channel, found mode {mode}; export it again"
-        )
-    return np.ascontiguousarray(values, np.float32) / np.float32(depth_scale)
+def _colours(frames: list[Frame], images: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
+    """Return the colours when every view has one that lies over its depth; they serve to register views without poses."""
+    found = []
+    for frame, (depth, _) in zip(frames, images, strict=True):
+        colour = files.intensity(frame.colour, depth.shape) if frame.colour else None
+        if colour is None:
+            return []
+        found.append(colour)
+    return found

@@ -41,9 +41,9 @@ def planes(views: Views, placement: Placement) -> Planes:
     corners = np.stack(np.meshgrid(*placement.bounds_m.T), axis=-1).reshape(-1, 3)
     poses = [placement.T_object_world @ T_world_camera for T_world_camera in views.T_world_cameras]
     parts, windows, projections, start = [], [], [], 0
-    for depth_m, T_object_camera in zip(views.depths_m, poses, strict=True):
-        low, high = _window(corners, views.intrinsics, T_object_camera, depth_m.shape)
-        K = views.intrinsics - [[0, 0, low[0]], [0, 0, low[1]], [0, 0, 0]]
+    for depth_m, K, T_object_camera in zip(views.depths_m, views.intrinsics, poses, strict=True):
+        low, high = _window(corners, K, T_object_camera, depth_m.shape)
+        K = K - [[0, 0, low[0]], [0, 0, low[1]], [0, 0, 0]]
         depth_m = depth_m[low[1] : high[1], low[0] : high[0]]
         usable = np.where(behind_edge(depth_m), 0, depth_m).astype(np.float32)
         parts.append(_fitted(usable, K, T_object_camera, placement.bounds_m))

@@ -48,9 +48,13 @@ def find(raw: str | Path, config: dict) -> Objects:
 
 def files(folder: str | Path) -> list[str]:
     """Return every file below `folder` in alphabetical order; hidden ones are left out, links are followed."""
-    found = []
+    found: list[str] = []
+    walked = set()
     for parent, folders, names in os.walk(folder, followlinks=True):
+        walked.add(os.path.realpath(parent))
         folders[:] = [name for name in folders if not name.startswith(".")]
+        # A link to a folder above would lead round and round.
+        folders[:] = [name for name in folders if os.path.realpath(os.path.join(parent, name)) not in walked]
         found += [os.path.join(parent, name) for name in names if not name.startswith(".")]
     return sorted(found)
 
@@ -95,6 +99,10 @@ def _check_dropped(folder: Path) -> None:
     for path in files(folder):
         if "{" in path or "}" in path:  # Snakemake would read a wildcard
             raise PipelineError(f"{path}: expected a file name without braces, found some; rename the file")
+        if not path.isprintable():
+            raise PipelineError(f"{path!a}: expected a file name of printable characters; rename the file")
+        if not os.path.exists(path):
+            raise PipelineError(f"{path}: expected a file, found a link to nothing; remove it or mend it")
 
 
 def _check_configured(key: str, names: set[str], known: set[str]) -> None:

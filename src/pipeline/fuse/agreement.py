@@ -1,0 +1,222 @@
+"""Do the views agree with each other? If not, which common mistake in poses or units would make them agree?"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.errors import PipelineError
+from pipeline.fuse.raw import Views
+from pipeline.geometry import frames
+
+# Two views agree at a point when the second measures it within this; coarse, as it is to tell mistakes from noise.
+TOLERANCE_M, TOLERANCE_SHARE = 0.010, 0.01
+LEAST = 0.4  # of the points that another view could see: right poses reach 0.6 to 0.9, wrong ones 0.15
+LEAST_OF_A_VIEW = 0.2
+MOST_LEFT_OUT = 0.2  # of the views
+NEAREST_M, FURTHEST_M = 0.1, 10.0  # of what stands on a table, from a depth camera
+POINTS, PAIRS = 400, 200
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """A common mistake: what to say of it, what to do, and the poses and the factor on depths without it."""
+
+    says: str
+    cure: str
+    right: Callable[[np.ndarray], np.ndarray]
+    depth_factor: float = 1.0
+
+
+def checked(views: Views, name: str, rng: np.random.Generator) -> tuple[Views, list[str]]:
+    """Return the views whose poses fit the others', and the names of those left out.
+
+    A `PipelineError` names the mistake that explains the disagreement: poses world→camera, another unit of lengths or
+    depths, another convention of camera axes or quaternions.
+    """
+    _check_range(views, name)
+    if len(views.depths_m) < 2:
+        return views, []
+    sample = _sample(views, rng)
+    poses = np.stack(views.T_world_cameras)
+    shares = agreement(views, sample, poses, 1.0)
+    bad = np.nan_to_num(shares) < LEAST_OF_A_VIEW
+    left_out = [view for view, is_bad in zip(views.names, bad, strict=True) if is_bad]
+    if np.median(np.nan_to_num(shares)) < LEAST or bad.mean() > MOST_LEFT_OUT:
+        raise PipelineError(_named(views, sample, poses, float(np.nan_to_num(shares).mean()), left_out, name))
+    return only(views, ~bad), left_out
+
+
+def only(views: Views, kept: np.ndarray) -> Views:
+    """Return the views (N,) that are kept."""
+    index = np.nonzero(kept)[0]
+    angles = views.options.turntable_deg
+    options = (
+        replace(views.options, turntable_deg=tuple(angles[i] for i in index)) if angles else views.options
+    )
+    return replace(
+        views,
+        depths_m=[views.depths_m[i] for i in index],
+        T_world_cameras=[views.T_world_cameras[i] for i in index if views.T_world_cameras],
+        intrinsics=views.intrinsics[index],
+        names=[views.names[i] for i in index],
+        colours=[views.colours[i] for i in index if views.colours],
+        options=options,
+    )
+
+
+def _check_range(views: Views, name: str) -> None:
+    depths = np.array([np.median(depth[depth > 0]) for depth in views.depths_m if depth.any()])
+    median = float(np.median(depths))
+    if not NEAREST_M < median < FURTHEST_M:
+        raise PipelineError(
+            f"{name}: expected depths between {NEAREST_M} and {FURTHEST_M:g} m, found {median:.3g} m in the middle; the images "
+            f"have other units: write `depth_scale:` with their units per metre into {Path(name) / 'scan.yaml'} (1000 for mm)"
+        )
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Points (M, 3) of each view in its camera's frame, and the pairs (P, 2) of views that are compared."""
+
+    points_m: list[np.ndarray]
+    pairs: np.ndarray
+
+
+def _sample(views: Views, rng: np.random.Generator) -> Sample:
+    points = []
+    for depth, K in zip(views.depths_m, views.intrinsics, strict=True):
+        v, u = np.nonzero(depth)
+        chosen = rng.integers(len(v), size=POINTS) if len(v) else np.zeros(0, int)
+        points.append(unprojected(u[chosen], v[chosen], depth[v[chosen], u[chosen]], K))
+    n = len(points)
+    pairs = np.array([(i, j) for i in range(n) for j in range(n) if i != j])
+    if len(pairs) > PAIRS:
+        near = np.array([(i, (i + step) % n) for i in range(n) for step in (1, n - 1)])
+        pairs = np.concatenate([near, pairs[rng.choice(len(pairs), PAIRS, replace=False)]])
+    return Sample(points, pairs)
+
+
+def unprojected(u: np.ndarray, v: np.ndarray, depth_m: np.ndarray, K: np.ndarray) -> np.ndarray:
+    """Return points (N, 3) in the camera's frame of pixels (u, v) with their depths (N,)."""
+    z = depth_m.astype(float)
+    return np.stack([(u - K[0, 2]) / K[0, 0] * z, (v - K[1, 2]) / K[1, 1] * z, z], axis=-1)
+
+
+def projected(points_camera: np.ndarray, K: np.ndarray, depth_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the measured depth (N,) where points (N, 3) of the camera's frame appear, 0 for none, and their own depth."""
+    z = points_camera[:, 2]
+    safe = np.where(z > 1e-6, z, 1.0)
+    pixel = np.rint((points_camera[:, :2] / safe[:, None]) * [K[0, 0], K[1, 1]] + K[:2, 2])
+    height, width = depth_m.shape
+    inside = (z > 1e-6) & (pixel >= 0).all(axis=1) & (pixel[:, 0] < width) & (pixel[:, 1] < height)
+    u, v = np.where(inside, pixel.T, 0).astype(int)
+    return np.where(inside, depth_m[v, u], 0.0), z
+
+
+def agreement(views: Views, sample: Sample, T_world_cameras: np.ndarray, depth_factor: float) -> np.ndarray:
+    """Return for each view (N,) the share of points that it and another view both see and both measure alike.
+
+    NaN for a view that sees nothing of what the others do.
+    """
+    n = len(sample.points_m)
+    alike, seen = np.zeros(n), np.zeros(n)
+    T_camera_worlds = np.linalg.inv(T_world_cameras)
+    for i, j in sample.pairs:
+        points = frames.apply(T_camera_worlds[j] @ T_world_cameras[i], sample.points_m[i] * depth_factor)
+        measured, expected = projected(points, views.intrinsics[j], views.depths_m[j])
+        there = measured > 0
+        near = np.abs(measured * depth_factor - expected) < TOLERANCE_M + TOLERANCE_SHARE * np.abs(expected)
+        for k in (i, j):
+            alike[k] += np.count_nonzero(near & there)
+            seen[k] += np.count_nonzero(there)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(seen >= 0.02 * POINTS, alike / seen, np.nan)
+
+
+def seen_through(points_world: np.ndarray, views: Views, own: np.ndarray, others: int) -> np.ndarray:
+    """Return which points (N, 3) more of a few other views look through than measure: of what moved, or of noise.
+
+    own (N,): the view that each point is from.
+    """
+    n = len(views.depths_m)
+    votes = np.zeros(len(points_world), int)
+    for j in np.unique(np.linspace(0, n - 1, min(n, others)).round().astype(int)):
+        points = frames.apply(frames.inverse(views.T_world_cameras[j]), points_world)
+        measured, expected = projected(points, views.intrinsics[j], views.depths_m[j])
+        behind = measured - expected
+        limit = TOLERANCE_M + TOLERANCE_SHARE * np.abs(expected)
+        seen = (measured > 0) & (own != j)
+        votes += (seen & (behind > limit)).astype(int) - (seen & (np.abs(behind) <= limit))
+    return votes > 0
+
+
+def _named(
+    views: Views, sample: Sample, poses: np.ndarray, given: float, left_out: list[str], name: str
+) -> str:
+    """Return the sentence about the mistake that explains the disagreement best, if one does."""
+    best, mistake = max(LEAST, given + 0.1), None
+    for candidate in _mistakes(name, views.depth_scale):
+        shares = agreement(views, sample, candidate.right(poses), candidate.depth_factor)
+        share = float(np.nan_to_num(shares).mean())
+        if share > best + 0.02:  # of two that explain it alike, the simpler one, which comes first
+            best, mistake = share, candidate
+    if mistake is not None:
+        return f"{name}: expected poses camera→world in metres and depths that fit them, found {mistake.says}; {mistake.cure}"
+    if given < LEAST:
+        return (
+            f"{name}: expected views that agree with each other, found that they do not, nor with any common mistake corrected; "
+            "check that poses are camera→world in metres, the order of images and poses, the intrinsics and depth_scale"
+        )
+    return (
+        f"{name}: expected poses that fit the images, found {len(left_out)} of {len(views.names)} views that others do not "
+        f"agree with, such as {left_out[0]}; correct their poses or remove them"
+    )
+
+
+def _mistakes(name: str, depth_scale: float) -> Iterator[Mistake]:
+    file = Path(name) / "scan.yaml"
+    yield Mistake("poses world→camera", "write their inverses", np.linalg.inv)
+    for factor, unit in ((0.001, "mm"), (0.01, "cm"), (1000.0, "m")):
+        cure = f"write `units: {unit}` into {file}"
+        yield Mistake(f"translations in {unit}", cure, _scaled(factor))
+        both = f"write the inverses of the poses, and `units: {unit}` into {file}"
+        yield Mistake(f"poses world→camera in {unit}", both, lambda T, f=factor: np.linalg.inv(_scaled(f)(T)))  # type: ignore[misc]
+    flip = np.diag([1.0, -1.0, -1.0, 1.0])
+    cure = "turn the axes y and z of each pose round (OpenCV's convention: x right, y down, z forward)"
+    yield Mistake("cameras that look along -z (OpenGL's convention)", cure, lambda T: T @ flip)
+    yield Mistake(
+        "poses world→camera of cameras that look along -z (OpenGL's convention)",
+        f"write their inverses and {cure}",
+        lambda T: np.linalg.inv(T) @ flip,
+    )
+    yield Mistake("quaternions in the order w x y z", "write them as x y z w", _reordered)
+    for scale in (
+        1000.0,
+        5000.0,
+        10000.0,
+        100.0,
+        4000.0,
+        2000.0,
+        *np.geomspace(depth_scale / 8, depth_scale * 8, 81),
+    ):
+        says = f"depths that fit at about {scale:.4g} units per metre"
+        yield Mistake(says, f"write `depth_scale: {scale:.4g}` into {file}", lambda T: T, depth_scale / scale)
+
+
+def _scaled(factor: float) -> Callable[[np.ndarray], np.ndarray]:
+    scale = np.ones((4, 4))
+    scale[:3, 3] = factor
+    return lambda T: T * scale
+
+
+def _reordered(T: np.ndarray) -> np.ndarray:
+    """Return poses (N, 4, 4) whose quaternions w x y z were read as x y z w."""
+    from scipy.spatial.transform import Rotation
+
+    right = T.copy()
+    right[:, :3, :3] = Rotation.from_quat(
+        np.roll(Rotation.from_matrix(T[:, :3, :3]).as_quat(), -1, axis=1)
+    ).as_matrix()
+    return right

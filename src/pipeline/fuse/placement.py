@@ -1,0 +1,266 @@
+"""The one object on the table: what belongs to it, where its frame is."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from pipeline.errors import PipelineError
+from pipeline.fuse import agreement, table
+from pipeline.fuse.raw import Views
+from pipeline.fuse.table import CELL_M, CURE, Placement, Plane, Points
+from pipeline.geometry import frames
+
+ABOVE_M, ABOVE_SIGMAS, MOST_ABOVE_M = (
+    0.008,
+    3.0,
+    0.025,
+)  # points this far above the table are no noise of the table
+MARGIN_M = 0.008  # around the object
+LARGEST_M = 0.45
+MOST_BELOW = 0.05  # of the points over the footprint may lie more than `BELOW_M` below the table
+BELOW_M = 0.010
+LEAST_POINTS = 300
+LEAST_OF_A_VIEW = 60
+# A second object: this far from the first at most, with this share of its points, in this share of the views.
+SECOND_M, SECOND_POINTS, SECOND_VIEWS = 0.15, 0.15, 0.5
+# A base under the object: its border is flat, it is so many times larger than what stands on it.
+FLAT_M, FLAT_SHARE, BASE_AREAS = 0.004, 0.7, 2.0
+OTHERS = 12  # views that are asked whether they look through a point
+# What is nearer together is one thing; in a single view its own shadow lies between its parts.
+GAP_M, SHADOW_M = 0.016, 0.12
+AROUND_M = 0.15  # the table is fitted again this far around the object: depth cameras bend large planes
+_HITS_OF_NOISE = 3  # stray pixels hit a cell once or twice; a cell of the object is hit by many views
+
+
+class NoObject(PipelineError):
+    """There is no object on this plane; another plane may be the table."""
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """Points that stand together on the table: their mask (N,), share of the views that see them, bounds (2, 3)."""
+
+    mask: np.ndarray
+    n: int
+    views: float
+    bounds_m: np.ndarray
+
+    @property
+    def centre_m(self) -> np.ndarray:
+        """The middle (2,) of the footprint."""
+        return self.bounds_m[:, :2].mean(axis=0)
+
+    def shown(self, T_world_table: np.ndarray, views: Views | None) -> str:
+        """Return size and place in words: where in which image it is, or in the world of a cloud without images."""
+        size = " × ".join(f"{1000 * e:.0f}" for e in np.ptp(self.bounds_m, axis=0))
+        place = frames.apply(T_world_table, np.array([*self.centre_m, self.bounds_m[1, 2] / 2]))
+        if views is None:
+            return f"one of {size} mm at ({', '.join(f'{x:.3f}' for x in place)}) m"
+        x, y, z = views.intrinsics[0] @ frames.apply(frames.inverse(views.T_world_cameras[0]), place)
+        return f"one of {size} mm at pixel ({x / z:.0f}, {y / z:.0f}) of {views.names[0]}"
+
+
+def find(views: Views, name: str, rng: np.random.Generator) -> tuple[Plane, Placement]:
+    """Find the table and the one object on it, near what the cameras look at; the rest is background.
+
+    The table is the plane of most points on which something stands. A `PipelineError` says what is missing, or shows
+    both objects when there are two.
+    """
+    points, middle = table.world_points(views), table.focus(views)
+    near = points.only(np.linalg.norm(points.places_m - middle, axis=1) < table.NEAR_M)
+    eyes = np.array([T[:3, 3] for T in views.T_world_cameras])
+    failures: list[NoObject] = []
+    for plane in table.planes(near.places_m, eyes, name, rng):
+        try:
+            first = place(near, _above(near, plane, views), plane, middle, views, name)
+            height_m = _platter_m(first)
+            if height_m is not None:
+                plane = Plane(plane.normal, plane.offset_m - height_m, plane.rms_m)
+            plane = _locally(near, plane, first, eyes, on_it=height_m is not None)
+            return plane, place(near, _above(near, plane, views), plane, middle, views, name)
+        except NoObject as failure:
+            failures.append(failure)
+    raise failures[0]
+
+
+def on_a_plane(points_m: np.ndarray, name: str, rng: np.random.Generator) -> tuple[Plane, Placement]:
+    """Find the table in a cloud (N, 3) without cameras, and the object on it: on the side where most of the rest is."""
+    points = Points(points_m, np.zeros(len(points_m), int))
+    failure: PipelineError | None = None
+    for plane in table.planes(points_m, points_m.mean(axis=0)[None], name, rng):
+        height = plane.height(points_m)
+        above = points.only((height > ABOVE_M) & (height < LARGEST_M))
+        try:
+            middle = np.median(above.places_m, axis=0) if len(above.view) else points_m[0]
+            return plane, place(points, above, plane, middle, None, name)
+        except NoObject as error:
+            failure = failure or error
+    raise failure or NoObject(f"{name}: expected a table under the object, found none")
+
+
+def _above(points: Points, plane: Plane, views: Views) -> Points:
+    """Return what rises out of the table's noise and stays where it is: no hand and no robot's arm."""
+    height = plane.height(points.places_m)
+    least = float(np.clip(ABOVE_SIGMAS * spread_m(height), ABOVE_M, MOST_ABOVE_M))
+    above = points.only((height > least) & (height < LARGEST_M))
+    return above.only(~agreement.seen_through(above.places_m, views, above.view, OTHERS))
+
+
+def spread_m(height_m: np.ndarray) -> float:
+    """Return the standard deviation of the table's points, from heights (N,) of all: the depth camera's noise."""
+    table_m = height_m[np.abs(height_m) < MOST_ABOVE_M]
+    return 1.4826 * float(np.median(np.abs(table_m - np.median(table_m)))) if len(table_m) else 0.0
+
+
+def place(
+    points: Points, above: Points, plane: Plane, focus: np.ndarray, views: Views | None, name: str
+) -> Placement:
+    """Return where the object stands on the plane: what of the points above it is nearest to the focus (3,)."""
+    T_table_world = table_frame(plane)
+    places = frames.apply(T_table_world, above.places_m)
+    middle = frames.apply(T_table_world, focus)[:2]
+    near = np.linalg.norm(places[:, :2] - middle, axis=1) < LARGEST_M
+    places = places[near]
+    single = views is not None and len(views.names) == 1
+    gap_m, least = (SHADOW_M, LEAST_OF_A_VIEW) if single else (GAP_M, LEAST_POINTS)
+    found = _clusters(Points(places, above.view[near]), middle, gap_m) if len(places) else []
+    if not found or found[0].n < least:
+        raise NoObject(
+            f"{name}: expected an object on the table, found {found[0].n if found else 0} points together more than "
+            f"{ABOVE_M * 1e3:.0f} mm above it; {CURE} and that the object is in view"
+        )
+    cluster = found[0]
+    _check_size(cluster, name)
+    _check_alone(found, middle, frames.inverse(T_table_world), views, name)
+    own = places[cluster.mask]
+    centre = np.array([*cluster.centre_m, 0.0])
+    T_object_world = frames.transform(np.eye(3), -centre) @ T_table_world
+    placement = Placement(T_object_world, *_region(own - centre), own - centre)
+    _check_below(placement, frames.apply(T_object_world, points.places_m), name)
+    return placement
+
+
+def _platter_m(placement: Placement) -> float | None:
+    """Return the height of a flat base that the object stands on, such as a turntable's, or None.
+
+    A base is flat all along its border, and much larger than what stands on it.
+    """
+    z = placement.points_m[:, 2]
+    cells = tuple(np.floor((placement.points_m[:, :2] - placement.bounds_m[0, :2]) / CELL_M).astype(int).T)
+    top = np.zeros(placement.footprint.shape)
+    np.maximum.at(top, cells, z)
+    held = ndimage.binary_fill_holes(ndimage.binary_closing(top > 0))
+    border = held & ~ndimage.binary_erosion(held, iterations=3) & (top > 0)
+    height = float(np.median(top[border]))
+    flat = np.abs(top - height) < FLAT_M
+    above = top > height + ABOVE_M
+    if np.mean(flat[border]) < FLAT_SHARE or np.count_nonzero(z > height + ABOVE_M) < LEAST_POINTS:
+        return None
+    if np.count_nonzero(held) < BASE_AREAS * np.count_nonzero(ndimage.binary_fill_holes(above)):
+        return None
+    return float(np.median(z[np.abs(z - height) < FLAT_M]))
+
+
+def _locally(points: Points, plane: Plane, placement: Placement, eyes: np.ndarray, on_it: bool) -> Plane:
+    """Return the plane fitted again to the table around the object, or to the base that it stands on."""
+    if on_it:
+        places = frames.apply(placement.T_object_world, points.places_m)
+        own = placement.covers(places[:, 0], places[:, 1])
+        return table.refined(points.places_m[own], plane.normal, plane.offset_m, eyes)
+    places = frames.apply(placement.T_object_world, points.places_m)
+    low, high = placement.bounds_m[0, :2] - AROUND_M, placement.bounds_m[1, :2] + AROUND_M
+    around = ((places[:, :2] > low) & (places[:, :2] < high)).all(axis=1)
+    around &= ~placement.covers(places[:, 0], places[:, 1])
+    if np.count_nonzero(around) < LEAST_POINTS:
+        return plane
+    return table.refined(points.places_m[around], plane.normal, plane.offset_m, eyes)
+
+
+def table_frame(plane: Plane) -> np.ndarray:
+    """Return T_table_world: z up from the table, x along the world's x (or y, when that is nearly upright)."""
+    along = np.eye(3)[0 if abs(plane.normal[0]) < 0.9 else 1]
+    x = along - (along @ plane.normal) * plane.normal
+    x /= np.linalg.norm(x)
+    R = np.stack([x, np.cross(plane.normal, x), plane.normal])
+    return frames.transform(R, np.array([0.0, 0.0, plane.offset_m]))
+
+
+def _clusters(points: Points, middle: np.ndarray, gap_m: float) -> list[Cluster]:
+    """Return what stands together, seen from above; the most likely object first, then by number of points.
+
+    What reaches beyond the circle that was searched is background.
+    """
+    places, n_views = points.places_m, points.view.max() + 1
+    origin = places[:, :2].min(axis=0)
+    cells = np.floor((places[:, :2] - origin) / CELL_M).astype(int)
+    counts = np.zeros(cells.max(axis=0) + 1, int)
+    np.add.at(counts, tuple(cells.T), 1)
+    hit = counts > min(_HITS_OF_NOISE, n_views // 3)
+    bridged = max(1, round(gap_m / CELL_M / 2))
+    held = np.pad(hit, bridged + 1)
+    labels, n = ndimage.label(ndimage.binary_closing(held, iterations=bridged), np.ones((3, 3)))
+    label = labels[tuple(cells.T + bridged + 1)]
+    seen = np.zeros((n + 1, n_views), int)
+    np.add.at(seen, (label, points.view), 1)
+    found = []
+    for k in np.nonzero(seen.sum(axis=1) >= LEAST_OF_A_VIEW)[0]:
+        mask = label == k
+        own = places[mask]
+        reach = np.linalg.norm(own[:, :2] - middle, axis=1)
+        if k == 0 or np.mean(reach > LARGEST_M - 2 * CELL_M) > 0.01:
+            continue
+        tall = np.sort(own[:, 2])[-10]
+        bounds = np.array([[*own.min(axis=0)[:2], 0.0], [*own.max(axis=0)[:2], tall]])
+        found.append(Cluster(mask, int(mask.sum()), float((seen[k] >= 10).mean()), bounds))
+    return sorted(
+        found, key=lambda c: -c.n * c.views * np.exp(-((np.linalg.norm(c.centre_m - middle) / 0.15) ** 2))
+    )
+
+
+def _check_size(cluster: Cluster, name: str) -> None:
+    size = np.ptp(cluster.bounds_m, axis=0)
+    if max(size) > LARGEST_M:
+        raise NoObject(
+            f"{name}: expected an object of at most {LARGEST_M} m on the table, found one of "
+            f"{' × '.join(f'{e:.2f}' for e in size)} m; check units, poses and what stands around the object"
+        )
+
+
+def _check_alone(
+    found: list[Cluster], middle: np.ndarray, T_world_table: np.ndarray, views: Views | None, name: str
+) -> None:
+    first = found[0]
+    reach = np.linalg.norm(first.centre_m - middle)
+    for other in found[1:]:
+        low, high = first.bounds_m[:, :2]
+        gap = np.linalg.norm(
+            np.maximum(np.maximum(low - other.bounds_m[1, :2], other.bounds_m[0, :2] - high), 0.0)
+        )
+        central = np.linalg.norm(other.centre_m - middle) < 1.5 * reach + 0.05
+        alike = other.n > SECOND_POINTS * first.n and other.views >= SECOND_VIEWS
+        if alike and (gap < SECOND_M or central):
+            raise PipelineError(
+                f"{name}: expected one object on the table, found two, {first.shown(T_world_table, views)} and "
+                f"{other.shown(T_world_table, views)}; record one at a time"
+            )
+
+
+def _check_below(placement: Placement, points_m: np.ndarray, name: str) -> None:
+    """Refuse scans that see through the table under the object: their poses or depths are wrong."""
+    over = points_m[placement.covers(points_m[:, 0], points_m[:, 1])]
+    share = float(np.mean(over[:, 2] < -BELOW_M))
+    if share > MOST_BELOW:
+        raise NoObject(
+            f"{name}: expected nothing below the table under the object, found {share:.0%} of the points there; {CURE}"
+        )
+
+
+def _region(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    low = np.array([*points.min(axis=0)[:2], 0.0]) - [MARGIN_M, MARGIN_M, 0.0]
+    high = np.array([*points.max(axis=0)[:2], np.sort(points[:, 2])[-10]]) + MARGIN_M
+    cells = np.floor((points[:, :2] - low[:2]) / CELL_M).astype(int)
+    footprint = np.zeros(np.ceil((high - low)[:2] / CELL_M).astype(int) + 1, bool)
+    footprint[tuple(cells.T)] = True
+    footprint = ndimage.binary_fill_holes(footprint)
+    return np.array([low, high]), ndimage.binary_dilation(footprint, np.ones((3, 3)), iterations=2)

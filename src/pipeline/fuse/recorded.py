@@ -1,0 +1,79 @@
+"""Depth images on their way to fusion: poses checked, or found where there are none; table and object found."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pipeline.errors import PipelineError
+from pipeline.fuse import agreement, placement, registration, table
+from pipeline.fuse.raw import Views
+from pipeline.fuse.table import Placement, Plane
+
+COARSE = 12  # pixels
+LEAST_SEEN, LOW_SHARE = 0.85, 0.1  # of the surface higher than this share of the object
+
+
+@dataclass(frozen=True)
+class Located:
+    """Views that fit together, the table and the object on it; left_out: names of the views that do not fit;
+    registration: how poses were found, empty where they were given."""
+
+    views: Views
+    plane: Plane
+    placement: Placement
+    left_out: list[str]
+    registration: dict[str, Any]
+
+    @property
+    def spread_m(self) -> float:
+        """The noise of depth, from the table."""
+        return placement.spread_m(self.plane.height(table.world_points(self.views, COARSE).places_m))
+
+    def facts(self) -> dict[str, Any]:
+        """Return what fusion.json says of the scan."""
+        views = self.views
+        eyes = [(self.placement.T_object_world @ T)[:3, 3].tolist() for T in views.T_world_cameras]
+        return {
+            "layout": views.layout,
+            "n_views": len(views.depths_m),
+            "n_views_found": views.n_found,
+            "views_left_out": self.left_out,
+            "unit_m": 1.0,
+            "T_object_world": self.placement.T_object_world.tolist(),
+            "table_plane_world": [*self.plane.normal.tolist(), self.plane.offset_m],
+            "table_rms_m": self.plane.rms_m,
+            "table_spread_m": self.spread_m,
+            "eyes_object_m": eyes,
+            "poses": "registered" if self.registration else "given",
+            **self.registration,
+        }
+
+
+def located(views: Views, name: str, rng: np.random.Generator) -> Located:
+    """Return the views in one world, with the table and the object; a `PipelineError` names the folder and what is wrong."""
+    if views.options.on_table is False:
+        raise PipelineError(
+            f"{name}/scan.yaml: on_table: expected true for depth images, as up comes from the table, found false; remove the key"
+        )
+    found: dict[str, Any] = {}
+    if not views.T_world_cameras:
+        views, found = registration.registered(views, name, rng)
+    views, left_out = agreement.checked(views, name, rng)
+    plane, place = placement.find(views, name, rng)
+    return Located(views, plane, place, left_out, found)
+
+
+def check_registered(scan: Located, vertices_m: np.ndarray, seen: np.ndarray, name: str) -> None:
+    """Refuse registered views whose surface, vertices (V, 3) of which some were seen (V,), is not shown from all sides.
+
+    Views that were turned wrongly contradict each other: they leave holes, or what nobody saw.
+    """
+    if not scan.registration:
+        return
+    share = float(seen[vertices_m[:, 2] > LOW_SHARE * vertices_m[:, 2].max()].mean())
+    if share < LEAST_SEEN:
+        raise PipelineError(
+            f"{name}: expected views without poses to show the whole object once they are registered, found {share:.0%} of its "
+            "surface seen; record more views all round and from above, write `turntable_deg:` into scan.yaml, or add poses"
+        )

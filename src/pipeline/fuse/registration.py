@@ -1,0 +1,310 @@
+"""Views without poses: stood upright by the table in each, then turned and shifted on it until they fit together.
+
+Turns are searched all round, so that neither an order of the views nor an overlap of neighbours is needed. A fit counts
+what a view measures (places, normals, colours: nearest neighbours in all three) and what it looks through.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import minimum_filter
+from scipy.spatial import cKDTree
+
+from pipeline.errors import PipelineError
+from pipeline.fuse import placement, tsdf
+from pipeline.fuse.agreement import projected
+from pipeline.fuse.levelled import NORMAL_M, Levelled, axis_of, level
+from pipeline.fuse.raw import Views
+from pipeline.geometry import frames
+
+TURNS, REFINED = 72, 6
+CAP_M = 0.010  # a point further than this from all others fits nothing
+EDGE_M, SURE_EDGE_M = (
+    0.006,
+    0.009,
+)  # to either side of a pixel: to choose a turn, and to say that it can be told
+FIRST_STEEPNESS = 0.85  # sine of the elevation of the view that the others are fitted to
+TOLD = 0.03  # of the points must contradict a wrong turn
+SAME_CAMERA = 0.02  # of its height in metres and the sines of its tilt
+GOLDEN = 0.381966  # of a whole turn
+ALONG = 0.1  # weight of distances along the surface
+ALIKE = 0.5  # cosine between normals of points that are the same
+ROBUST_M = 0.002  # residuals beyond count less
+THROUGH_M = 0.008  # a view looks through what is this far in front of what it measures
+COARSE, FINE, MODEL, MOST_MODEL = 300, 1200, 1500, 15_000  # points
+ITERATIONS, SWEEPS = 12, 10
+LEAST_VIEWS = 6
+WITNESSES = 8  # views that are asked whether they look through another's points
+VOXEL_M, ROUNDS, STEPS, NEAR_M = 0.002, 5, 4, 0.006  # of the fit to the fused surface
+MISFIT = 0.03  # weight of distances beside that of contradictions
+MOST_LEFT_OUT = 0.2
+
+
+def registered(views: Views, name: str, rng: np.random.Generator) -> tuple[Views, dict[str, Any]]:
+    """Return the views with poses T_world_camera, and what fusion.json says of how they were found.
+
+    The world is that of a steep view: z up from the table. A `PipelineError` says what views lack, or that they do not fit
+    together.
+    """
+    if len(views.depths_m) < LEAST_VIEWS:
+        raise PipelineError(
+            f"{name}: expected at least {LEAST_VIEWS} views where there are no poses, found {len(views.depths_m)}; record more, or "
+            "add their poses"
+        )
+    stood, left_out = _levelled(views, name, rng)
+    poses, told = _placed(stood, views, rng)
+    poses = _swept(stood, poses, rng)
+    if told < TOLD:
+        poses = _all_round(stood, poses)
+    poses = fitted_to_surface(stood, poses, views, name, rng)
+    facts = {"views_without_object": left_out, "roll_observable": told >= TOLD, "roll_evidence": told}
+    return _with(views, stood, poses), facts
+
+
+def _all_round(stood: list[Levelled], poses: list[np.ndarray]) -> list[np.ndarray]:
+    """Return the poses of views of a round object, turned about its axis so that they come from all sides.
+
+    Where no view tells turns apart, each is as right from any side, and together they show the whole surface of revolution.
+    """
+    features = np.concatenate([view.features(T) for view, T in zip(stood, poses, strict=True)])
+    normals = features[:, 3:6] / np.maximum(np.linalg.norm(features[:, 3:6], axis=1, keepdims=True), 1e-12)
+    shift = frames.transform(np.eye(3), np.array([*-axis_of(features[:, :3], normals), 0.0]))
+    turns = (frames.inverse(shift) @ _turn(2 * np.pi * GOLDEN * k) @ shift for k in range(len(poses)))
+    return [turn @ T for turn, T in zip(turns, poses, strict=True)]
+
+
+def _levelled(views: Views, name: str, rng: np.random.Generator) -> tuple[list[Levelled], list[str]]:
+    """Return the views that show table and object; those that see a handle or a corner first, as they tell turns apart."""
+    stood, failures = [], {}
+    for i in range(len(views.depths_m)):
+        try:
+            stood.append(level(views, i, name, rng))
+        except PipelineError as failure:
+            failures[views.names[i]] = failure
+    if len(failures) > MOST_LEFT_OUT * len(views.depths_m):
+        raise next(iter(failures.values()))
+    return sorted(
+        stood, key=lambda view: (-round(view.lopsided_m / 0.005), abs(view.steepness - FIRST_STEEPNESS))
+    ), list(failures)
+
+
+def _placed(stood: list[Levelled], views: Views, rng: np.random.Generator) -> tuple[list[np.ndarray], float]:
+    """Return T_world_level of each view: one after the other against all before it, then again against all others.
+
+    And how well turns are told apart: the share of points that the worst turn contradicts, in the middle of the views.
+    """
+    cameras = list(zip(views.depths_m, views.intrinsics, strict=True))
+    near, sure = ([_nearest(depth, K, edge) for depth, K in cameras] for edge in (EDGE_M, SURE_EDGE_M))
+    poses, told = [np.eye(4)], np.zeros(len(stood))
+    for k in [*range(1, len(stood)), *range(1, len(stood))]:
+        others = np.array([j for j in range(len(poses)) if j != k])
+        asked = rng.choice(others, size=min(len(others), WITNESSES), replace=False)
+        witnesses = [(stood[j].number, frames.inverse(poses[j] @ stood[j].T_level_camera)) for j in asked]
+        share = max(COARSE, MOST_MODEL // len(others))
+        model = np.concatenate([_some(stood[j], share, rng).features(poses[j]) for j in others])
+        known = _known_turn(stood, poses, k, views.options.turntable_deg)
+        evidence, certain = (Evidence(images, views.intrinsics, witnesses) for images in (near, sure))
+        pose, told[k] = _best(stood[k], known, model, evidence, certain, rng)
+        poses = [*poses[:k], pose, *poses[k + 1 :]]
+    return poses, float(np.median(told[1:]))
+
+
+def _known_turn(
+    stood: list[Levelled], poses: list[np.ndarray], k: int, angles_deg: tuple[float, ...] | None
+) -> float | None:
+    """Return the turn of the k-th view by the turntable's angle since a view placed before, of a camera that stands alike.
+
+    Angles count anticlockwise, seen from above. None where there are no angles or no such view.
+    """
+    if angles_deg is None:
+        return None
+    for j in range(len(poses)):
+        moved = np.abs(stood[j].T_level_camera[2] - stood[k].T_level_camera[2]).max()
+        if j != k and moved < SAME_CAMERA:
+            turned = angles_deg[stood[k].number] - angles_deg[stood[j].number]
+            return float(np.arctan2(poses[j][1, 0], poses[j][0, 0]) - np.radians(turned))
+    return None
+
+
+def _nearest(depth_m: np.ndarray, K: np.ndarray, edge_m: float) -> np.ndarray:
+    """Return the least depth within `edge_m` of each pixel (H, W): edges are not that sure."""
+    known = depth_m[depth_m > 0]
+    pixels = 1 + 2 * round(edge_m * K[0, 0] / float(np.median(known))) if len(known) else 1
+    least = minimum_filter(np.where(depth_m > 0, depth_m, np.inf), pixels)
+    return np.where(np.isfinite(least), least, 0.0)
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Nearest depths around each pixel (H, W), cameras, and some that are placed already: number and T_camera_world."""
+
+    nearest_m: list[np.ndarray]
+    intrinsics: np.ndarray
+    witnesses: list[tuple[int, np.ndarray]]
+
+    def against(self, view: Levelled, T: np.ndarray, probe: np.ndarray) -> float:
+        """Return the share of the model's points that the view looks through, and of the view's that others look through."""
+        T_camera_world = frames.inverse(T @ view.T_level_camera)
+        own = self._through(view.number, T_camera_world, probe)
+        features = view.features(T)
+        others = [self._through(number, T_camera, features) for number, T_camera in self.witnesses]
+        return own + float(np.mean(others))
+
+    def _through(self, number: int, T_camera_world: np.ndarray, features: np.ndarray) -> float:
+        """Return the share of points that face the camera, and that it looks through."""
+        points = frames.apply(T_camera_world, features[:, :3])
+        facing = np.einsum("nc,nc->n", points, frames.rotate(T_camera_world, features[:, 3:6])) < 0
+        measured, expected = projected(points, self.intrinsics[number], self.nearest_m[number])
+        asked = facing & (measured > 0)
+        return float(np.mean(asked & (measured - expected > THROUGH_M)))
+
+
+def _best(
+    view: Levelled,
+    known: float | None,
+    model: np.ndarray,
+    evidence: Evidence,
+    sure: Evidence,
+    rng: np.random.Generator,
+) -> tuple[np.ndarray, float]:
+    """Return T_world_level that fits a view best to the model (M, 7), and how well the evidence tells turns apart.
+
+    What counts is what contradicts: parts that only one of them saw are no evidence.
+    """
+    coarse, fine = (_some(view, n, rng) for n in (COARSE, FINE))
+    probe = model[rng.integers(len(model), size=MODEL)]
+    turned = [_turn(2 * np.pi * i / TURNS) for i in range(TURNS)]
+    costs = np.array([evidence.against(coarse, T, probe) for T in turned])
+    lower = (costs <= np.roll(costs, 1)) & (costs <= np.roll(costs, -1))
+    starts = [turned[i] for i in sorted(np.nonzero(lower)[0], key=lambda i: costs[i])[:REFINED]]
+    tree = cKDTree(model)
+    ends = [_icp(fine, T, tree, ITERATIONS) for T in (starts if known is None else [_turn(known)])]
+    best = min(ends, key=lambda T: evidence.against(fine, T, probe) + MISFIT * _misfit(fine, T, tree))
+    return best, float(np.ptp([sure.against(coarse, T, probe) for T in turned]))
+
+
+def _some(view: Levelled, n: int, rng: np.random.Generator) -> Levelled:
+    index = rng.choice(len(view.points_m), size=min(n, len(view.points_m)), replace=False)
+    return replace(
+        view, points_m=view.points_m[index], normals=view.normals[index], intensity=view.intensity[index]
+    )
+
+
+def _turn(angle_rad: float) -> np.ndarray:
+    return frames.transform(frames.rotation_about(np.array([0.0, 0.0, 1.0]), angle_rad), np.zeros(3))
+
+
+def _misfit(view: Levelled, T: np.ndarray, tree: cKDTree) -> float:
+    """Return the mean squared distance of a view's features to the model's, in parts of `CAP_M`, each at most one."""
+    distance, _ = tree.query(view.features(T), distance_upper_bound=CAP_M)
+    return float(np.mean(np.minimum(distance / CAP_M, 1.0) ** 2))
+
+
+def _icp(view: Levelled, T: np.ndarray, tree: cKDTree, iterations: int) -> np.ndarray:
+    """Return T after steps towards the nearest features of the model."""
+    for _ in range(iterations):
+        features = view.features(T)
+        distance, index = tree.query(features, distance_upper_bound=CAP_M)
+        near = distance < CAP_M
+        here, there = features[near], tree.data[index[near]]
+        # A handle's left half, seen by one view, is not its right half, seen by another.
+        alike = np.einsum("nc,nc->n", here[:, 3:6], there[:, 3:6]) > ALIKE * NORMAL_M**2
+        step = fitting_step(here[alike, :3], there[alike, :3], there[alike, 3:6] / NORMAL_M)
+        T = step @ T
+        if np.abs(step - np.eye(4)).max() < 1e-5:
+            break
+    return T
+
+
+def fitting_step(here: np.ndarray, there: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Return the small turn about z and shift across it that bring points (N, 3) into planes (Chen & Medioni 1991).
+
+    The planes pass through `there` (N, 3) with unit normals (N, 3).
+    """
+    if len(here) < 20:
+        return np.eye(4)
+    x, y = here[:, 0], here[:, 1]
+    A = np.column_stack([x * normals[:, 1] - y * normals[:, 0], normals[:, 0], normals[:, 1]])
+    b = np.einsum("nc,nc->n", normals, there - here)
+    w = 1 / (1 + (b / ROBUST_M) ** 2)
+    # The small extra weight holds what the pairs do not determine: the turn of a round cup.
+    normal = np.einsum("n,ni,nj->ij", w, A, A) + np.diag([1e-6, 1e-3, 1e-3]) * len(b)
+    right = np.einsum("n,ni,n->i", w, A, b)
+    # So do the pairs themselves, a little, for the shift alone: of a rim seen from above no plane stands across.
+    normal[[1, 2], [1, 2]] += ALONG * w.sum()
+    right[1:] += ALONG * np.einsum("n,nc->c", w, (there - here)[:, :2])
+    turn, dx, dy = np.linalg.solve(normal, right)
+    return frames.transform(np.eye(3), np.array([dx, dy, 0.0])) @ _turn(turn)
+
+
+def _swept(stood: list[Levelled], poses: list[np.ndarray], rng: np.random.Generator) -> list[np.ndarray]:
+    """Return the poses after every view was fitted to those of the other half, again and again."""
+    poses = list(poses)
+    fine = [_some(view, FINE, rng) for view in stood]
+    for sweep in range(2 * SWEEPS):
+        half = rng.permutation(len(stood)) % 2 == sweep % 2
+        tree = cKDTree(np.concatenate([fine[k].features(poses[k]) for k in np.nonzero(half)[0]]))
+        for k in np.nonzero(~half)[0]:
+            poses[k] = _icp(fine[k], poses[k], tree, 3)
+    return poses
+
+
+def fitted_to_surface(
+    stood: list[Levelled], poses: list[np.ndarray], views: Views, name: str, rng: np.random.Generator
+) -> list[np.ndarray]:
+    """Return the poses after views were fused and each fitted to the surface, again and again.
+
+    The surface is the mean of all views, so its normals and edges are better than those of any one.
+    """
+    for _ in range(ROUNDS):
+        posed = _with(views, stood, poses)
+        _, place = placement.find(posed, name, rng)
+        surface = tsdf.fuse(posed, place, VOXEL_M, 2 * VOXEL_M, name)
+        seen = surface.seen[surface.triangles].all(axis=1)
+        vertices = frames.apply(frames.inverse(place.T_object_world), surface.vertices_m)
+        nearest = Nearest(vertices, surface.triangles[seen])
+        for k, view in enumerate(stood):
+            for _ in range(STEPS):
+                here = frames.apply(poses[k], view.points_m)
+                there, normals = nearest(here)
+                facing = frames.rotate(poses[k], view.normals)
+                near = (np.linalg.norm(there - here, axis=1) < NEAR_M) & (
+                    np.einsum("nc,nc->n", facing, normals) > ALIKE
+                )
+                poses[k] = fitting_step(here[near], there[near], normals[near]) @ poses[k]
+    return poses
+
+
+class Nearest:
+    """The nearest points of a mesh, with the normals there."""
+
+    def __init__(self, vertices_m: np.ndarray, triangles: np.ndarray) -> None:
+        """Take vertices (V, 3) and triangles (F, 3)."""
+        import open3d as o3d
+
+        self._tensor = o3d.core.Tensor.from_numpy
+        self._scene = o3d.t.geometry.RaycastingScene(nthreads=1)
+        self._scene.add_triangles(
+            self._tensor(np.ascontiguousarray(vertices_m, np.float32)),
+            self._tensor(np.ascontiguousarray(triangles, np.uint32)),
+        )
+
+    def __call__(self, points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the nearest points (N, 3) to points (N, 3), and unit normals (N, 3)."""
+        found = self._scene.compute_closest_points(self._tensor(points_m.astype(np.float32)), nthreads=1)
+        return found["points"].numpy().astype(float), found["primitive_normals"].numpy().astype(float)
+
+
+def _with(views: Views, stood: list[Levelled], poses: list[np.ndarray]) -> Views:
+    """Return the views in their own order with poses T_world_camera."""
+    order = sorted(range(len(stood)), key=lambda k: stood[k].number)
+    chosen = [stood[k].number for k in order]
+    return replace(
+        views,
+        depths_m=[views.depths_m[i] for i in chosen],
+        T_world_cameras=[poses[k] @ stood[k].T_level_camera for k in order],
+        intrinsics=views.intrinsics[chosen],
+        names=[views.names[i] for i in chosen],
+        colours=[views.colours[i] for i in chosen if views.colours],
+    )

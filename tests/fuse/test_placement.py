@@ -1,0 +1,109 @@
+"""The object on the table is found among other things; two objects are an error that shows both."""
+
+import re
+
+import numpy as np
+import pytest
+import trimesh
+from fuse import writers
+
+from pipeline.errors import PipelineError
+from pipeline.fuse import layouts, placement
+from pipeline.geometry import frames
+from pipeline.scan import camera, recording
+from pipeline.scan.shapes import shape
+
+CUP = shape("small_cup")
+T_WORLD_OBJECT = frames.transform(np.eye(3), np.array([0.02, -0.03, recording.TABLE_HEIGHT_M]))
+
+
+def box(x: float, y: float, size=(0.06, 0.06, 0.08), bottom: float = recording.TABLE_HEIGHT_M):
+    """Return a box that stands at (x, y)."""
+    body = trimesh.creation.box(size)
+    return body.vertices + [x, y, bottom + size[2] / 2], body.faces
+
+
+def found(folder, *others, hide=None, table: bool = True, n: int = 12):
+    """Record the cup and others on the table, and return the table and the placement that fuse finds."""
+    cup = frames.apply(T_WORLD_OBJECT, CUP.vertices_m), CUP.triangles
+    scene = camera.Scene([cup, *([recording.table()] if table else []), *others])
+    target = T_WORLD_OBJECT[:3, 3] + [0, 0, 0.03]
+    recorded = []
+    for i, T in enumerate(camera.turntable(n, target, 0.6)):
+        depth = camera.depth_image(scene, T, camera.Noise(1.0), np.random.default_rng(i))
+        recorded.append((depth if hide is None else hide(i, depth), T))
+    writers.seven_scenes(folder, recorded)
+    return placement.find(layouts.read(folder), str(folder), np.random.default_rng(3))
+
+
+def check_cup(place) -> None:
+    """The bounds are the cup's, with the margin, on the table."""
+    T = place.T_object_world @ T_WORLD_OBJECT
+    assert abs(T[2, 3]) < 0.0005
+    assert np.linalg.norm(T[:2, 3]) < 0.002
+    size = np.ptp(place.bounds_m, axis=0) - [
+        2 * placement.MARGIN_M,
+        2 * placement.MARGIN_M,
+        placement.MARGIN_M,
+    ]
+    np.testing.assert_allclose(size, np.ptp(CUP.vertices_m, axis=0), atol=0.006)
+
+
+def test_clutter_further_away_and_the_room_behind_are_cut_away(tmp_path):
+    clutter = [box(0.30, 0.05), box(-0.25, 0.2, (0.1, 0.1, 0.2)), box(0.05, -0.33, (0.2, 0.05, 0.1))]
+    room = [
+        box(0.0, 0.9, (4.0, 0.1, 3.0), 0.0),
+        box(-0.9, 0.0, (0.1, 4.0, 3.0), 0.0),
+        box(0, 0, (6.0, 6.0, 0.1), -0.1),
+    ]
+    _, place = found(tmp_path, *clutter, *room)
+    check_cup(place)
+
+
+def test_a_hand_in_some_views_is_not_part_of_the_object(tmp_path):
+    """A block of pixels nearer than the object hides part of it in every third view."""
+
+    def hand(i: int, depth: np.ndarray) -> np.ndarray:
+        if i % 3 == 0:
+            depth = depth.copy()
+            depth[280:480, 300 + 5 * i : 360 + 5 * i] = 480
+        return depth
+
+    _, place = found(tmp_path, hide=hand)
+    check_cup(place)
+
+
+def test_a_table_smaller_than_the_floor(tmp_path):
+    floor = box(0.0, 0.0, (6.0, 6.0, 0.1), 0.2)
+    plane, place = found(tmp_path, floor)
+    assert plane.offset_m == pytest.approx(-recording.TABLE_HEIGHT_M, abs=0.0005)
+    check_cup(place)
+
+
+def test_two_objects_are_an_error_that_shows_both(tmp_path):
+    with pytest.raises(PipelineError, match="found two") as caught:
+        found(tmp_path, box(0.16, 0.02))
+    message = str(caught.value)
+    assert str(tmp_path) in message
+    T_camera_world = np.linalg.inv(np.loadtxt(tmp_path / "frame-000000.pose.txt"))
+    for place in (
+        [0.02, -0.03, recording.TABLE_HEIGHT_M + 0.03],
+        [0.16, 0.02, recording.TABLE_HEIGHT_M + 0.04],
+    ):
+        x, y, z = camera.intrinsics() @ frames.apply(T_camera_world, np.array(place))
+        shown = re.findall(r"pixel \((\d+), (\d+)\) of frame-000000.depth.png", message)
+        assert min(np.hypot(x / z - int(u), y / z - int(v)) for u, v in shown) < 5
+
+
+def test_a_crumb_beside_the_object_is_none(tmp_path):
+    _, place = found(tmp_path, box(0.09, 0.0, (0.012, 0.012, 0.012)))
+    check_cup(place)
+
+
+def test_an_object_on_a_turntable_stands_on_it(tmp_path):
+    disc = trimesh.creation.cylinder(0.13, 0.02, sections=64)
+    low = disc.vertices + [0.03, -0.02, recording.TABLE_HEIGHT_M - 0.01], disc.faces
+    lower = box(0.0, 0.0, (0.8, 0.8, 0.02), recording.TABLE_HEIGHT_M - 0.04)
+    plane, place = found(tmp_path, low, lower, table=False)
+    assert plane.offset_m == pytest.approx(-recording.TABLE_HEIGHT_M, abs=0.0005)
+    check_cup(place)
