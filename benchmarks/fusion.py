@@ -15,9 +15,10 @@ import open3d as o3d
 
 from pipeline.errors import PipelineError
 from pipeline.fuse import tsdf
-from pipeline.fuse.layouts import Views
+from pipeline.fuse.placement import find
 from pipeline.fuse.planes import behind_edge
-from pipeline.fuse.table import Placement, place, table_plane, world_points
+from pipeline.fuse.raw import Options, Views
+from pipeline.fuse.table import Placement
 from pipeline.geometry import frames
 from pipeline.geometry.cavity import cavity
 from pipeline.geometry.surface import Surface
@@ -52,10 +53,18 @@ def recorded(body: SimpleNamespace, noise: float) -> tuple[Views, Placement]:
     T_world_object = recording.pose_on_table(recording.generator(SEED, body.name, 0))
     pairs = recording.views(body, T_world_object, VIEWS, DISTANCE_M, noise, SEED)
     depths = [(depth_mm / np.float32(1000)).astype(np.float32) for depth_mm, _ in pairs]
-    views = Views(depths, [pose for _, pose in pairs], np.stack([camera.intrinsics()] * len(depths)))
-    points, eyes = world_points(views), np.array([pose[:3, 3] for _, pose in pairs])
-    plane = table_plane(points, eyes, body.name, np.random.default_rng(SEED))
-    return views, place(points, plane, body.name)
+    views = Views(
+        depths,
+        [pose for _, pose in pairs],
+        np.stack([camera.intrinsics()] * len(depths)),
+        [f"frame-{number:06d}" for number in range(len(depths))],
+        "7-scenes",
+        Options(),
+        [],
+        1000.0,
+        len(depths),
+    )
+    return views, find(views, body.name, np.random.default_rng(SEED))[1]
 
 
 def plain(views: Views, placement: Placement, voxel_m: float, truncation_m: float) -> tsdf.Surface:

@@ -8,9 +8,9 @@ import pytest
 import trimesh
 
 from pipeline.fuse import coverage, tsdf
-from pipeline.fuse.layouts import Views
 from pipeline.fuse.measuring import signed_distances
-from pipeline.fuse.table import place, table_plane, world_points
+from pipeline.fuse.placement import find
+from pipeline.fuse.raw import Options, Views
 from pipeline.geometry import frames
 from pipeline.geometry.cavity import cavity
 from pipeline.geometry.surface import Surface
@@ -44,13 +44,20 @@ def scanned(body: SimpleNamespace, views: int = 36) -> tuple[Views, np.ndarray]:
     pairs = recording.views(body, T_world_object, views, 0.6, 1.0, 1)
     depths = [(depth_mm / np.float32(1000)).astype(np.float32) for depth_mm, _ in pairs]
     return Views(
-        depths, [pose for _, pose in pairs], np.stack([camera.intrinsics()] * len(depths))
+        depths,
+        [pose for _, pose in pairs],
+        np.stack([camera.intrinsics()] * len(depths)),
+        [f"frame-{number:06d}" for number in range(len(depths))],
+        "7-scenes",
+        Options(),
+        [],
+        1000.0,
+        len(depths),
     ), T_world_object
 
 
 def fused(views: Views, truncation_m: float = TRUNCATION_M) -> tuple[tsdf.Surface, np.ndarray]:
-    points, eyes = world_points(views), np.array([T[:3, 3] for T in views.T_world_cameras])
-    placement = place(points, table_plane(points, eyes, "thin", np.random.default_rng(2)), "thin")
+    _, placement = find(views, "thin", np.random.default_rng(2))
     return tsdf.fuse(views, placement, VOXEL_M, truncation_m, "thin"), placement.T_object_world
 
 
