@@ -183,7 +183,7 @@ def measure(rounds: int) -> dict[str, object]:
     """Return every number."""
     inside = cup()
     vessels = {n: liquid.vessel(inside, spacing_m) for n, spacing_m in SPACING_M.items()}
-    ours, finer, filling = milliseconds(
+    ours, finer, pair = milliseconds(
         lambda: pour(vessels[155], 155, TILT_RAD, 1),
         lambda: pour(vessels[310], 310, TILT_RAD, 1),
         lambda: liquid.fill(*filling(vessels[155], 1)),
@@ -196,7 +196,7 @@ def measure(rounds: int) -> dict[str, object]:
     return {
         "ms_per_trial_155": ours,
         "ms_per_trial_310": finer,
-        "ms_per_trial_filling": filling,
+        "ms_per_trial_filling": pair,
         "ms_bullet_155": bullet,
         "ratio_bullet_155": bullet / beside,
         "rmse_155": rmse(vessels[155], 155),
