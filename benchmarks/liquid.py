@@ -14,6 +14,7 @@ from collections.abc import Callable
 import card
 import numpy as np
 import pybullet
+import splishsplash
 import trimesh
 
 from pipeline import command
@@ -199,6 +200,12 @@ def measure(rounds: int) -> dict[str, object]:
         "ms_per_trial_filling": pair,
         "ms_bullet_155": bullet,
         "ratio_bullet_155": bullet / beside,
+        **splishsplash.compare(
+            lambda: milliseconds(lambda: pour(vessels[155], 155, TILT_RAD, 1), rounds=1)[0],
+            splishsplash.Pour(RADIUS_M, DEPTH_M, SPACING_M[155], 155, TILT_RAD, SETTLE_S, TILT_S, WAIT_S),
+            REFERENCE,
+            rounds,
+        ),
         "rmse_155": rmse(vessels[155], 155),
         "rmse_310": rmse(vessels[310], 310),
         "trials_per_s_one_core": one,
