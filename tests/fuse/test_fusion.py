@@ -31,19 +31,36 @@ def case(request, fusion):
     return fusion(request.param)
 
 
-def test_both_sides_of_the_wall_are_where_they_should_be(case):
+def errors_by_side(case) -> dict[str, np.ndarray]:
+    """Return how far true points of each side are from the fused surface, in metres."""
     points = truth.cloud(case.shape, 20_000, np.random.default_rng(1))
     places = frames.apply(case.T_object_truth, artefacts.points(points)).astype(np.float32)
     error = scene_of(*case.result.mesh).compute_distance(places).numpy()
+    handle, inner = points.handle.to_numpy(), points.inner.to_numpy()
     standing = (points.z_m < 0.001).to_numpy()
-    inner = points.inner.to_numpy()
-    outer = ~inner & ~standing & ~points.handle.to_numpy()
-    # Below a bowl's curved wall nobody sees anything: there the outside is closed by guess.
-    for side, quantile_m in ((inner, 0.0005), (outer, 0.0015), (points.rim.to_numpy(), 0.001)):
+    sides = {
+        "inner": inner,
+        "outer": ~inner & ~standing & ~handle,
+        "rim": points.rim.to_numpy(),
+        "handle": handle,
+    }
+    return {name: error[side] for name, side in sides.items()}
+
+
+def test_both_sides_of_the_wall_are_where_they_should_be(case):
+    error = errors_by_side(case)
+    for side, quantile_m in (("inner", 0.0005), ("outer", 0.0015), ("rim", 0.001)):
         assert error[side].mean() < 0.0004
         assert np.quantile(error[side], 0.95) < quantile_m
     if case.shape.has_handle:
-        assert error[points.handle].mean() < 0.0006
+        assert error["handle"].mean() < 0.0006
+
+
+def test_the_outside_is_within_a_millimetre(request, case):
+    if case.shape.name == "wide_bowl":
+        reason = "1.3 mm: below a bowl's curved wall hardly anything is seen; it was 0.8 mm with a plain mean over the views"
+        request.applymarker(pytest.mark.xfail(reason=reason))
+    assert np.quantile(errors_by_side(case)["outer"], 0.95) < 0.001
 
 
 def test_walls_keep_their_thickness(case):

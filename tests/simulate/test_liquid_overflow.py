@@ -8,10 +8,11 @@ from pipeline.simulate.particles import particles
 
 SEEDS = (1, 2, 3)
 ROOMS = (6, 10, 15, 20)
-TOO_MUCH = pytest.mark.xfail(reason="at rest the top layer is a lattice, which takes some of what falls in")
 
 
-def taken_before_it_overflows(vessel: Vessel, room: int, seed: int, most: int = 40) -> int:
+def taken_before_it_overflows(
+    vessel: Vessel, room: int, seed: int, most: int = 40, wait_s: float = 0.1
+) -> int:
     """Return how many particles can be set down one by one, without speed, on a trial's liquid with that free room."""
     n = rest.particles_for(vessel, vessel.cavity.capacity_m3) - room
     p, dt = particles(n + most, vessel.walls), rest.time_step_s(vessel)
@@ -22,25 +23,44 @@ def taken_before_it_overflows(vessel: Vessel, room: int, seed: int, most: int = 
     )
     for k in range(most):
         rest._set_down(p, vessel, 1000 * seed + k)
-        if rest.rest(p, vessel.walls, dt, rest.ITERATIONS, int(0.25 / dt), 0.0)[0]:
+        if rest.rest(p, vessel.walls, dt, rest.ITERATIONS, int(wait_s / dt), 0.0)[0]:
             return k
     return most
 
 
-@pytest.mark.parametrize("name", ["cylinder", "thin", "cone", "bowl"])
+# With so short a wait what runs over late is missed, and at rest the top layer is a lattice. Which of these hold depends on
+# the last bits of the arithmetic.
+TOO_MUCH = pytest.mark.xfail(
+    reason="holds 3 to 9 particles more than its free room when the next one follows after 0.1 s"
+)
+TOO_LITTLE = pytest.mark.xfail(reason="the lattice of the top layer takes some of what falls in")
+GOOD = [*(("cylinder", room) for room in (6, 10, 15)), ("cone", 15), ("bowl", 15)]
+SHORT = [("thin", 6), ("thin", 10), ("thin", 15), ("cone", 6), ("cone", 10), ("bowl", 6), ("bowl", 10)]
+CASES = [*GOOD, *(pytest.param(*case, marks=TOO_MUCH) for case in SHORT)]
+
+
+@pytest.mark.parametrize(("name", "room"), CASES)
 def test_filled_gently_it_overflows_when_its_free_room_is_taken(
-    request: pytest.FixtureRequest, name: str
+    request: pytest.FixtureRequest, name: str, room: int
 ) -> None:
+    vessel = request.getfixturevalue(name)
+    taken = np.mean([taken_before_it_overflows(vessel, room, seed) for seed in SEEDS])
+    assert taken == pytest.approx(room, abs=3)
+
+
+@pytest.mark.parametrize("name", ["cylinder", "thin", "cone", "bowl"])
+def test_filled_slowly_it_overflows_at_its_capacity(request: pytest.FixtureRequest, name: str) -> None:
     """The calibration is one of the mean, and of the particles at hand: other roundings order them otherwise near the brim."""
     vessel = request.getfixturevalue(name)
     excess = [
-        np.mean([taken_before_it_overflows(vessel, room, seed) for seed in SEEDS]) - room for room in ROOMS
+        np.mean([taken_before_it_overflows(vessel, room, seed, wait_s=0.25) for seed in SEEDS]) - room
+        for room in ROOMS
     ]
     assert abs(np.mean(excess)) < 0.015 * liquid.holds(vessel)
     assert np.abs(excess).max() < 0.04 * liquid.holds(vessel)
 
 
-@pytest.mark.parametrize(("room", "least", "most"), [pytest.param(0, 5, 30, marks=TOO_MUCH), (40, 0, 0)])
+@pytest.mark.parametrize(("room", "least", "most"), [pytest.param(0, 5, 30, marks=TOO_LITTLE), (40, 0, 0)])
 def test_what_falls_from_a_cups_height_splashes_over_near_the_brim_alone(
     cylinder: Vessel, bowl: Vessel, room: int, least: int, most: int
 ) -> None:

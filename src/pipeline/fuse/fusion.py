@@ -11,6 +11,7 @@ from pipeline.artefacts import Mesh
 from pipeline.errors import PipelineError
 from pipeline.fuse import coverage, dropped, layouts, recorded, tsdf
 from pipeline.fuse.cloud import cloud
+from pipeline.geometry.surface import Surface
 
 LEAST_POINTS = 5000
 # A surface further than this from half of its own measurements was fused from views that do not fit together.
@@ -84,7 +85,8 @@ def _residuals(
     scan: recorded.Located, surface: tsdf.Surface, name: str, rng: np.random.Generator
 ) -> dict[str, Any]:
     points = scan.placement.points_m
-    residual = _distance(surface, points[rng.integers(len(points), size=_RESIDUAL_POINTS)])
+    measured = points[rng.integers(len(points), size=_RESIDUAL_POINTS)]
+    residual = Surface(surface.vertices_m, surface.triangles).distance(measured)
     median, high = np.quantile(residual, [0.5, 0.95])
     largest = max(LARGEST_RESIDUAL_M, scan.spread_m)
     if median > largest:
@@ -94,17 +96,3 @@ def _residuals(
         )
     twentieths = np.quantile(residual, np.linspace(0, 1, 21)).tolist()
     return {"residual_m": {"median": float(median), "quantile_95": float(high), "twentieths": twentieths}}
-
-
-def _distance(surface: tsdf.Surface, points_m: np.ndarray) -> np.ndarray:
-    import open3d as o3d
-
-    scene = o3d.t.geometry.RaycastingScene()
-    arrays = (
-        surface.vertices_m.astype(np.float32),
-        surface.triangles.astype(np.uint32),
-        points_m.astype(np.float32),
-    )
-    vertices, triangles, points = (o3d.core.Tensor.from_numpy(array) for array in arrays)
-    scene.add_triangles(vertices, triangles)
-    return scene.compute_distance(points).numpy().astype(float)

@@ -1,4 +1,4 @@
-"""Where fuse's result goes: mesh, cloud and report appear together or not at all."""
+"""Where fuse's result goes: mesh, cloud and report, each whole or not at all."""
 
 from pathlib import Path
 

@@ -17,6 +17,7 @@ from pipeline.fuse.agreement import projected
 from pipeline.fuse.levelled import NORMAL_M, Levelled, axis_of, level
 from pipeline.fuse.raw import Views
 from pipeline.geometry import frames
+from pipeline.geometry.surface import Surface
 
 TURNS, REFINED = 72, 6
 CAP_M = 0.010  # a point further than this from all others fits nothing
@@ -263,37 +264,17 @@ def fitted_to_surface(
         surface = tsdf.fuse(posed, place, VOXEL_M, 2 * VOXEL_M, name)
         seen = surface.seen[surface.triangles].all(axis=1)
         vertices = frames.apply(frames.inverse(place.T_object_world), surface.vertices_m)
-        nearest = Nearest(vertices, surface.triangles[seen])
+        fused = Surface(vertices, surface.triangles[seen])
         for k, view in enumerate(stood):
             for _ in range(STEPS):
                 here = frames.apply(poses[k], view.points_m)
-                there, normals = nearest(here)
+                there, normals = fused.nearest(here)
                 facing = frames.rotate(poses[k], view.normals)
                 near = (np.linalg.norm(there - here, axis=1) < NEAR_M) & (
                     np.einsum("nc,nc->n", facing, normals) > ALIKE
                 )
                 poses[k] = fitting_step(here[near], there[near], normals[near]) @ poses[k]
     return poses
-
-
-class Nearest:
-    """The nearest points of a mesh, with the normals there."""
-
-    def __init__(self, vertices_m: np.ndarray, triangles: np.ndarray) -> None:
-        """Take vertices (V, 3) and triangles (F, 3)."""
-        import open3d as o3d
-
-        self._tensor = o3d.core.Tensor.from_numpy
-        self._scene = o3d.t.geometry.RaycastingScene(nthreads=1)
-        self._scene.add_triangles(
-            self._tensor(np.ascontiguousarray(vertices_m, np.float32)),
-            self._tensor(np.ascontiguousarray(triangles, np.uint32)),
-        )
-
-    def __call__(self, points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the nearest points (N, 3) to points (N, 3), and unit normals (N, 3)."""
-        found = self._scene.compute_closest_points(self._tensor(points_m.astype(np.float32)), nthreads=1)
-        return found["points"].numpy().astype(float), found["primitive_normals"].numpy().astype(float)
 
 
 def _with(views: Views, stood: list[Levelled], poses: list[np.ndarray]) -> Views:

@@ -82,12 +82,13 @@ def holds(vessel: Vessel) -> int:
 def overflows_at(vessel: Vessel) -> float:
     """Return how many particles are there just before the first runs over when a trial's liquid is topped up: a mean."""
     target = particles_for(vessel, vessel.cavity.capacity_m3)
-    missing = [_of(target, room) for room in _ROOMS * (2 if target < _TWICE_BELOW else 1)]
+    missing = [_scaled(target, room) for room in _ROOMS * (2 if target < _TWICE_BELOW else 1)]
     starts = [settle(vessel, max(target - room, 1), turn) for turn, room in enumerate(missing)]
     return float(np.mean([len(_topped_up(vessel, start, 1 + turn)) for turn, start in enumerate(starts)]))
 
 
-def _of(target: int, room: int) -> int:
+def _scaled(target: int, room: int) -> int:
+    """Return as large a share of a vessel for more particles as the room is of `_OF`."""
     return round(room * max(1.0, target / _OF))
 
 
@@ -110,7 +111,7 @@ def _topped(vessel: Vessel) -> np.ndarray:
             n = len(vessel.settled[n]) - 1
         states = [_topped_up(vessel, vessel.settled[n], 0)]
         for turn, room in enumerate(_ROOMS[:_TOP_UPS], start=1):
-            left = max(len(states[-1]) - _of(target, room), 1)
+            left = max(len(states[-1]) - _scaled(target, room), 1)
             states.append(_topped_up(vessel, _lowest(states[-1], left), turn))
         vessel.settled[TOPPED] = sorted(states[1:], key=len)[_TOP_UPS // 2]
     return vessel.settled[TOPPED]
