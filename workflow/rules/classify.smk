@@ -1,5 +1,6 @@
 # Needs the trials of all objects and their parameters.
-# Makes classify/<experiment>/: predictions, scores and ROC curves of every feature set, on the same and on novel objects.
+# Makes classify/<experiment>/: predictions, scores and ROC curves of every feature set, on the same and on novel objects,
+#       and models.json, the classifiers as plain numbers.
 # How: logistic regression by iteratively reweighted least squares on a few trials, tested on the rest.
 
 
@@ -12,6 +13,7 @@ rule classify:
         predictions=f"{PROCESSED}/classify/{{experiment}}/predictions.parquet",
         scores=f"{PROCESSED}/classify/{{experiment}}/scores.parquet",
         curves=f"{PROCESSED}/classify/{{experiment}}/curves.parquet",
+        models=f"{PROCESSED}/classify/{{experiment}}/models.json",
     log:
         "logs/classify/{experiment}.log",
     benchmark:
@@ -23,4 +25,4 @@ rule classify:
     shell:
         "python -m pipeline.classify --experiment {wildcards.experiment} --trials {input.trials:q} --parameters {input.parameters:q}"
         " --tilt-references {input.tilt_references:q} --predictions {output.predictions:q} --scores {output.scores:q}"
-        " --curves {output.curves:q} {params.options} > {log:q} 2>&1"
+        " --curves {output.curves:q} --models {output.models:q} {params.options} > {log:q} 2>&1"

@@ -9,11 +9,11 @@ LABELS = {"pouring": "poured", "filling": "filled"}
 
 
 def main() -> None:
-    """Read all objects' trials and warped parameters; write predictions, scores and ROC curves."""
+    """Read all objects' trials and warped parameters; write predictions, scores, ROC curves and the classifiers."""
     parser = command.parser(__doc__)
     parser.add_argument("--experiment", choices=list(LABELS), required=True)
     parser.add_argument("--trials", type=Path, nargs="+", required=True, help="one table an object")
-    for option in ("--parameters", "--tilt-references", "--predictions", "--scores", "--curves"):
+    for option in ("--parameters", "--tilt-references", "--predictions", "--scores", "--curves", "--models"):
         parser.add_argument(option, type=Path, required=True)
     parser.add_argument("--samples", type=int, default=50, help="trials a classifier is trained on")
     parser.add_argument("--draws", type=int, default=20, help="training sets an object")
@@ -25,6 +25,7 @@ def main() -> None:
 
     from pipeline.classify.features import FEATURE_SETS, MAPPINGS, features, parameters_of
     from pipeline.classify.protocol import ceiling, evaluate
+    from pipeline.models import write_models
 
     trials = pd.concat([read_table(path, "trials") for path in options.trials], ignore_index=True)
     trials = trials[~trials["failed"]].reset_index(drop=True)
@@ -49,6 +50,7 @@ def main() -> None:
     write_table(options.predictions, pd.concat(results.predictions, ignore_index=True), "predictions")
     write_table(options.scores, pd.DataFrame(results.scores), "scores")
     write_table(options.curves, pd.concat(results.curves, ignore_index=True), "curves")
+    write_models(options.models, results.models)
 
 
 if __name__ == "__main__":

@@ -9,18 +9,21 @@ import numpy as np
 import pandas as pd
 
 from pipeline.classify.regression import FPR_GRID, Score, classifier, iterations, score, separable
+from pipeline.classify.trained import trained
 from pipeline.errors import PipelineError
+from pipeline.models import Model
 
 MAX_REDRAWS = 1000
 
 
 @dataclass
 class Results:
-    """Rows of the tables `predictions` (a frame a classifier), `scores` and `curves`."""
+    """Rows of the tables `predictions` (a frame a classifier), `scores` and `curves`, and the classifiers themselves."""
 
     predictions: list[pd.DataFrame] = field(default_factory=list)
     scores: list[dict[str, Any]] = field(default_factory=list)
     curves: list[pd.DataFrame] = field(default_factory=list)
+    models: list[Model] = field(default_factory=list)
 
     def add_score(
         self, head: dict[str, Any], outcome: Score, labels: np.ndarray, training: dict[str, Any]
@@ -75,6 +78,7 @@ def evaluate(
                 **{"n_iterations": n_iterations, "converged": converged, "n_redrawn": redrawn},
                 "separable": separable(values[rows], labels[rows]),
             }
+            results.models.append(trained(fitted, {**head, "features": features}, ridge, len(rows), training))
             probability = fitted.predict_proba(values)[:, 1]
             _test(results, {**head, "features": features}, trials, labels, probability, rows, training)
     return results
