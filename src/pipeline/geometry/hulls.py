@@ -1,7 +1,7 @@
 """Convex hulls: their volume, points inside them, and the tilt that raises half of them above a lip."""
 
 import numpy as np
-from scipy.spatial import ConvexHull, Delaunay
+from scipy.spatial import ConvexHull
 from scipy.stats import qmc
 
 
@@ -21,7 +21,14 @@ def points_in_hull(points_m: np.ndarray, n: int) -> np.ndarray:
     share = hull.volume / float(np.prod(high - low))
     exponent = int(np.ceil(np.log2(n / share)))
     candidates = qmc.scale(qmc.Sobol(3, scramble=False).random_base2(exponent), low, high)
-    return candidates[Delaunay(points_m[hull.vertices]).find_simplex(candidates) >= 0]
+    return candidates[_inside(hull, candidates)]
+
+
+def _inside(hull: ConvexHull, points_m: np.ndarray) -> np.ndarray:
+    """Return which points (N, 3) are on the inner side of every facet; a few thousand at a time, to spare memory."""
+    outward, offsets_m = hull.equations[:, :3].T, hull.equations[:, 3]
+    blocks = np.array_split(points_m, len(points_m) // 4096 + 1)
+    return np.concatenate([(block @ outward <= -offsets_m).all(axis=1) for block in blocks])
 
 
 def raising_tilt_rad(points_m: np.ndarray, lip_m: np.ndarray, opening_m: np.ndarray) -> np.ndarray:

@@ -15,14 +15,15 @@ def neighbourhood_features(points_m: np.ndarray, neighbours: Sequence[int]) -> n
     neighbourhoods grow with the object and the features are free of units.
     """
     distance, index = cKDTree(points_m).query(points_m, k=max(neighbours))
-    columns = [_features(points_m, points_m[index[:, :k]], distance[:, k - 1 : k]) for k in neighbours]
+    around_m = points_m[index] - points_m[:, None]
+    columns = [_features(around_m[:, :k], distance[:, k - 1 : k]) for k in neighbours]
     return np.hstack(columns)
 
 
-def _features(points_m: np.ndarray, around_m: np.ndarray, radius_m: np.ndarray) -> np.ndarray:
+def _features(around_m: np.ndarray, radius_m: np.ndarray) -> np.ndarray:
+    """Return the features of points whose neighbours (N, k, 3) are given as seen from each."""
     mean = around_m.mean(axis=1)
-    centred = around_m - mean[:, None]
-    covariance = np.einsum("nki,nkj->nij", centred, centred) / around_m.shape[1]
+    second = around_m.transpose(0, 2, 1) @ around_m / around_m.shape[1]
+    covariance = second - mean[:, :, None] * mean[:, None]
     spread = np.sqrt(np.clip(np.linalg.eigvalsh(covariance)[:, ::-1], 0.0, None))
-    offset = np.linalg.norm(points_m - mean, axis=1, keepdims=True)
-    return np.hstack([spread, offset]) / radius_m
+    return np.hstack([spread, np.linalg.norm(mean, axis=1, keepdims=True)]) / radius_m

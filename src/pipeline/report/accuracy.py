@@ -60,10 +60,10 @@ def errors(processed: Path, source: str, name: str) -> dict[str, float]:
     truth = read_truth(processed, name)
     found = {f"fuse.{key}": value for key, value in fusion_errors(processed, name, truth).items()}
     parameters = read_table(processed / "parametrise" / source / f"{name}.parquet", "parameters")
+    inside_m = hulls.points_in_hull(points(truth.cloud[truth.cloud["container"]]), 20000)
     for mapping, row in parameters.set_index("mapping").iterrows():
-        found |= {
-            f"parametrise.{mapping}.{key}": value for key, value in parameter_errors(row, truth).items()
-        }
+        errors_of_row = parameter_errors(row, truth, inside_m)
+        found |= {f"parametrise.{mapping}.{key}": value for key, value in errors_of_row.items()}
     return found | (label_errors(processed, source, name, truth) if name != source else {})
 
 
@@ -187,10 +187,11 @@ def _balanced_accuracy(found: np.ndarray, true: np.ndarray) -> float:
     return float((found[true].mean() + (~found[~true]).mean()) / 2.0)
 
 
-def parameter_errors(row: pd.Series, truth: Truth) -> dict[str, float]:
+def parameter_errors(row: pd.Series, truth: Truth, inside_m: np.ndarray) -> dict[str, float]:
     """Return relative errors of the scalars, the opening's error (mm) and that of the tilt reference (degrees).
 
-    The tilt reference's truth is the same functional of the true hull, at the true rim point nearest to the warped lip.
+    The tilt reference's truth is the same functional of the true hull, filled by `inside_m` (N, 3), at the true rim point
+    nearest to the warped lip.
     """
     true_value = {**truth.facts, "volume_m3": truth.facts["hull_volume_m3"]}
     errors = {name: float(row[key] / true_value[key] - 1.0) for name, key in SCALARS.items()}
@@ -202,7 +203,6 @@ def parameter_errors(row: pd.Series, truth: Truth) -> dict[str, float]:
     )
     errors["opening_mm"] = float(np.linalg.norm(found_m - opening_m) * 1e3)
     true_lip_m = rim_m[np.argmin(np.linalg.norm(rim_m - lip_m, axis=1))]
-    inside_m = hulls.points_in_hull(points(truth.cloud[truth.cloud["container"]]), 20000)
     true_tilt_rad = hulls.tilt_reference_rad(inside_m, true_lip_m, opening_m)
     errors["tilt_reference_deg"] = float(np.degrees(row["tilt_reference_rad"] - true_tilt_rad))
     return errors
