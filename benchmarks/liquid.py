@@ -32,7 +32,6 @@ SPACING_M = {155: 0.010, 310: 0.008}
 REFERENCE = {60: 0.994, 65: 0.936, 70: 0.826, 75: 0.683, 80: 0.527, 90: 0.236, 100: 0.038}
 BULLET_HZ = 240
 TABLE = ((0.010, 155), (0.008, 310), (0.0063, 620), (0.005, 1240), (0.004, 2450), (0.0032, 5000))
-SECONDS = 6.0  # of each measurement of throughput
 SEEDS = 3
 CARD_TRIALS = 16384  # of each kind
 
@@ -138,11 +137,12 @@ def rmse(vessel: liquid.Vessel, n: int) -> float:
     return float(np.sqrt(np.mean((np.array(kept) - list(REFERENCE.values())) ** 2)))
 
 
-def throughput(processes: int) -> float:
-    """Return the trials per second of some processes, each with its own vessel, for a while after a common start."""
+def throughput(processes: int, seconds: float) -> float:
+    """Return the trials per second of some processes, each with its own vessel, `seconds` long after a common start."""
     context = multiprocessing.get_context("spawn")
     barrier, results = context.Barrier(processes), context.Queue()
-    workers = [context.Process(target=_pour_for_a_while, args=(barrier, results)) for _ in range(processes)]
+    work = (barrier, results, seconds)
+    workers = [context.Process(target=_pour_for_a_while, args=work) for _ in range(processes)]
     for worker in workers:
         worker.start()
     rates = [results.get() for _ in workers]
@@ -151,21 +151,21 @@ def throughput(processes: int) -> float:
     return float(sum(rates))
 
 
-def _pour_for_a_while(barrier, results) -> None:
+def _pour_for_a_while(barrier, results, seconds: float) -> None:
     vessel = liquid.vessel(cup(), SPACING_M[155])
     pour(vessel, 155, TILT_RAD, 0)
     barrier.wait()
     start, count = time.perf_counter(), 0
-    while time.perf_counter() - start < SECONDS:
+    while time.perf_counter() - start < seconds:
         pour(vessel, 155, TILT_RAD, count)
         count += 1
     results.put(count / (time.perf_counter() - start))
 
 
-def by_size(inside: Cavity, rounds: int) -> list[dict[str, float]]:
-    """Return what a pour costs by its number of particles: the volume stays, the spacing falls."""
+def by_size(inside: Cavity, rounds: int, most: int) -> list[dict[str, float]]:
+    """Return what a pour costs by its number of particles, up to `most`: the volume stays, the spacing falls."""
     rows = []
-    for spacing_m, n in TABLE:
+    for spacing_m, n in (row for row in TABLE if row[1] <= most):
         vessel = precompute(inside, spacing_m, 0.75)
         (ms,) = milliseconds(lambda v=vessel, n=n: pour(v, n, TILT_RAD, 1), rounds=rounds)
         steps = (HOLD_S + TILT_S + WAIT_S) / (STEP_PER_SPACING * spacing_m)
@@ -180,8 +180,8 @@ def by_size(inside: Cavity, rounds: int) -> list[dict[str, float]]:
     return rows
 
 
-def measure(rounds: int) -> dict[str, object]:
-    """Return every number."""
+def measure(rounds: int, seconds: float, most: int) -> dict[str, object]:
+    """Return every number: `rounds` of each comparison, throughput over `seconds`, up to `most` particles."""
     inside = cup()
     vessels = {n: liquid.vessel(inside, spacing_m) for n, spacing_m in SPACING_M.items()}
     ours, finer, pair = milliseconds(
@@ -193,7 +193,7 @@ def measure(rounds: int) -> dict[str, object]:
     beside, bullet = milliseconds(
         lambda: pour(vessels[155], 155, TILT_RAD, 1), lambda: bullet_pour(155, TILT_RAD), rounds=rounds
     )
-    one, two = throughput(1), throughput(2)
+    one, two = throughput(1, seconds), throughput(2, seconds)
     return {
         "ms_per_trial_155": ours,
         "ms_per_trial_310": finer,
@@ -211,7 +211,7 @@ def measure(rounds: int) -> dict[str, object]:
         "trials_per_s_one_core": one,
         "trials_per_s_two_cores": two,
         "ratio_two_cores": two / one,
-        "by_size": by_size(inside, rounds),
+        "by_size": by_size(inside, rounds, most),
     }
 
 
@@ -233,8 +233,11 @@ def main() -> None:
         "--device", choices=("cpu", "cuda"), default="cpu", help="cuda: a card beside one core"
     )
     parser.add_argument("--rounds", type=int, default=5, help="rounds of each comparison")
+    parser.add_argument("--seconds", type=float, default=6.0, help="of each measurement of throughput")
+    parser.add_argument("--most-particles", type=int, default=5000, help="of the table by size")
     options = parser.parse_args()
-    found = measure(options.rounds) if options.device == "cpu" else on_a_card()
+    extent = options.rounds, options.seconds, options.most_particles
+    found = measure(*extent) if options.device == "cpu" else on_a_card()
     lines = json.dumps(found, indent=2) if options.json else "\n".join(f"{k}: {v}" for k, v in found.items())
     sys.stdout.write(lines + "\n")
 
