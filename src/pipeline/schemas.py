@@ -51,6 +51,10 @@ TABLES = {
             *("centre_x_m", "centre_y_m", "centre_z_m"),
         )
     ),
+    # Every parameter of `parametrise.parameters`, a row a number: its value, its standard deviation over redrawn clouds.
+    "uncertainties": pa.schema(
+        _strings("object", "mapping", "parameter") + _floats("value", "std") + _strings("unit")
+    ),
     # The tilt reference with the lip at each rim point, object frame.
     "tilt_references": pa.schema(
         _strings("object", "mapping") + _floats("x_m", "y_m", "z_m", "tilt_reference_rad")

@@ -6,6 +6,7 @@ import pytest
 import yaml
 
 from pipeline.errors import PipelineError
+from pipeline.parametrise.parameters import PARAMETERS
 from pipeline.scan.shapes import NAMES
 from pipeline.workflow.configuration import check, nearest, typed
 
@@ -44,6 +45,15 @@ def test_every_key_is_explained_and_every_number_has_a_unit_and_a_range():
 
 def test_demonstration_objects_agree_with_the_shapes():
     assert tuple(SCHEMA["properties"]["scan"]["properties"]["objects"]["items"]["enum"]) == tuple(NAMES)
+
+
+def test_listed_parameters_agree_with_the_registered_ones():
+    listed = SCHEMA["properties"]["parametrise"]["properties"]["parameters"]["items"]["enum"]
+    assert sorted(listed) == sorted(PARAMETERS)
+    config = _config()
+    config["parametrise"]["parameters"] = ["radius_m", "volum_m3"]
+    with pytest.raises(PipelineError, match=r"parametrise\.parameters\.1: .*did you mean 'volume_m3'"):
+        check(config, SCHEMA)
 
 
 def test_texts_become_numbers_where_numbers_are_asked_for():

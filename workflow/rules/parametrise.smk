@@ -1,7 +1,7 @@
 # Needs both mappings of an object.
-# Makes parametrise/<source>/<object>.parquet and tilt_references/<object>.parquet, then the tables of all objects,
-#       parameters.parquet and tilt_references.parquet.
-# How: one function a parameter, evaluated on the warped points.
+# Makes parametrise/<source>/<object>.parquet and tilt_references/<object>.parquet; uncertainties/<object>.parquet, every listed
+#       parameter with its spread; then the tables of all objects, parameters.parquet, tilt_references.parquet, uncertainties.parquet.
+# How: one function a parameter, evaluated on the warped points, and on points drawn again from them for its uncertainty.
 
 
 rule parametrise:
@@ -22,6 +22,25 @@ rule parametrise:
     shell:
         "python -m pipeline.parametrise --object {wildcards.object} --point-mapping {input.point:q} --label-mapping {input.label:q}"
         " --parameters {output.parameters:q} --tilt-references {output.tilt_references:q} {params.options} > {log:q} 2>&1"
+
+
+rule uncertainties:
+    input:
+        point=rules.warp.output.point,
+        label=rules.warp.output.label,
+    output:
+        uncertainties=f"{PROCESSED}/parametrise/{{source}}/uncertainties/{{object}}.parquet",
+    log:
+        "logs/parametrise/uncertainties/{source}/{object}.log",
+    benchmark:
+        "benchmarks/parametrise/uncertainties/{source}/{object}.tsv"
+    threads: 1
+    params:
+        options=options("parametrise", "parameters", "hull_points", "redraws", "seed"),
+        code=code("pipeline.parametrise.uncertainty"),
+    shell:
+        "python -m pipeline.parametrise.uncertainty --object {wildcards.object} --point-mapping {input.point:q}"
+        " --label-mapping {input.label:q} --uncertainties {output.uncertainties:q} {params.options} > {log:q} 2>&1"
 
 
 rule assemble_parameters:
@@ -50,3 +69,17 @@ rule assemble_tilt_references:
         code=code("pipeline.parametrise.assemble"),
     shell:
         "python -m pipeline.parametrise.assemble --tables {input:q} --table tilt_references --output {output:q} > {log:q} 2>&1"
+
+
+rule assemble_uncertainties:
+    input:
+        each(rules.uncertainties.output.uncertainties),
+    output:
+        f"{PROCESSED}/parametrise/{SOURCE}/uncertainties.parquet",
+    log:
+        "logs/parametrise/uncertainties.log",
+    threads: 1
+    params:
+        code=code("pipeline.parametrise.assemble"),
+    shell:
+        "python -m pipeline.parametrise.assemble --tables {input:q} --table uncertainties --output {output:q} > {log:q} 2>&1"

@@ -2,7 +2,10 @@
 
 import numpy as np
 from scipy.spatial import ConvexHull
-from scipy.stats import qmc
+
+# 1/g, 1/g², 1/g³ with g⁴ = g + 1: the steps of the R3 sequence, Roberts 2018, "The unreasonable effectiveness of quasirandom
+# sequences", whose points leave no gaps.
+_STEPS = 1.2207440846057596 ** -np.arange(1.0, 4.0)
 
 
 def hull_volume_m3(points_m: np.ndarray) -> float:
@@ -11,24 +14,25 @@ def hull_volume_m3(points_m: np.ndarray) -> float:
 
 
 def points_in_hull(points_m: np.ndarray, n: int) -> np.ndarray:
-    """Return about `n` points (M, 3) spread evenly in the convex hull of points (N, 3).
+    """Return about `n` points (M, 3) spread evenly in the convex hull of points (N, 3)."""
+    return points_inside(ConvexHull(points_m), n)
 
-    They are the part inside the hull of a Sobol sequence in its bounding box: no seed, and the error of a mean over
+
+def points_inside(hull: ConvexHull, n: int) -> np.ndarray:
+    """Return about `n` points (M, 3) spread evenly in a convex hull.
+
+    They are the part inside the hull of a quasirandom sequence in its bounding box: no seed, and the error of a mean over
     them falls almost with 1/n.
     """
-    hull = ConvexHull(points_m)
-    low, high = hull.min_bound, hull.max_bound
-    share = hull.volume / float(np.prod(high - low))
-    exponent = int(np.ceil(np.log2(n / share)))
-    candidates = qmc.scale(qmc.Sobol(3, scramble=False).random_base2(exponent), low, high)
-    return candidates[_inside(hull, candidates)]
-
-
-def _inside(hull: ConvexHull, points_m: np.ndarray) -> np.ndarray:
-    """Return which points (N, 3) are on the inner side of every facet; a few thousand at a time, to spare memory."""
-    outward, offsets_m = hull.equations[:, :3].T, hull.equations[:, 3]
-    blocks = np.array_split(points_m, len(points_m) // 4096 + 1)
-    return np.concatenate([(block @ outward <= -offsets_m).all(axis=1) for block in blocks])
+    low, extent = hull.min_bound, hull.max_bound - hull.min_bound
+    count = int(np.ceil(n * np.prod(extent) / hull.volume))
+    candidates = low + extent * ((0.5 + np.arange(1, count + 1)[:, None] * _STEPS) % 1.0)
+    facets = np.unique(hull.equations.round(9), axis=0)
+    inside = np.ones(count, bool)
+    for some in np.array_split(facets, max(1, len(facets) // 64)):
+        rows = np.flatnonzero(inside)
+        inside[rows] = (candidates[rows] @ some[:, :3].T + some[:, 3] <= 0.0).all(axis=1)
+    return candidates[inside]
 
 
 def raising_tilt_rad(points_m: np.ndarray, lip_m: np.ndarray, opening_m: np.ndarray) -> np.ndarray:

@@ -11,7 +11,10 @@ def main() -> None:
     parser = command.parser(__doc__)
     parser.add_argument("--tables", type=Path, nargs="+", required=True)
     parser.add_argument(
-        "--table", choices=["parameters", "tilt_references"], required=True, help="what they are"
+        "--table",
+        choices=["parameters", "tilt_references", "uncertainties"],
+        required=True,
+        help="what they are",
     )
     parser.add_argument("--output", type=Path, required=True)
     options = parser.parse_args()

@@ -1,6 +1,7 @@
 """How near fusion, labels and parameters come to the truth about the demonstration objects: the truth's only reader."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +10,14 @@ import pandas as pd
 from pipeline import command
 from pipeline.artefacts import normals, points, read_json, read_mesh, read_table, write_json
 from pipeline.geometry import frames, hulls
-from pipeline.geometry.cavity import cavity
+from pipeline.geometry.cavity import Cavity, cavity, pour_axis, retained_volume_m3
 from pipeline.geometry.surface import Surface
 
 PARTS = ("container", "rim", "handle")
-SCALARS = {"radius": "radius_m", "height": "height_m", "capacity": "capacity_m3", "hull_volume": "volume_m3"}
+SCALARS = {
+    **{"radius": "radius_m", "height": "height_m", "capacity": "capacity_m3", "hull_volume": "volume_m3"},
+    "wall": "wall_m",
+}
 
 WALL_START_M, WALL_SKIN_M = (
     0.003,
@@ -43,6 +47,16 @@ class Truth:
     mesh: tuple[np.ndarray, np.ndarray]
     T_truth_object: np.ndarray
 
+    @cached_property
+    def cavity(self) -> Cavity:
+        """The true object's room for liquid."""
+        return cavity(*self.mesh, name="the true object")
+
+    @cached_property
+    def inside_m(self) -> np.ndarray:
+        """Points (M, 3) that fill the true container's hull evenly."""
+        return hulls.points_in_hull(points(self.cloud[self.cloud["container"]]), 20000)
+
 
 def read_truth(processed: Path, name: str) -> Truth:
     """Read the truth of one demonstration object."""
@@ -59,11 +73,13 @@ def errors(processed: Path, source: str, name: str) -> dict[str, float]:
     """Return all errors of one object as `<stage>.<what>`; of labels, where it is not the source."""
     truth = read_truth(processed, name)
     found = {f"fuse.{key}": value for key, value in fusion_errors(processed, name, truth).items()}
-    parameters = read_table(processed / "parametrise" / source / f"{name}.parquet", "parameters")
-    inside_m = hulls.points_in_hull(points(truth.cloud[truth.cloud["container"]]), 20000)
-    for mapping, row in parameters.set_index("mapping").iterrows():
-        errors_of_row = parameter_errors(row, truth, inside_m)
-        found |= {f"parametrise.{mapping}.{key}": value for key, value in errors_of_row.items()}
+    folder = processed / "parametrise" / source
+    parameters = read_table(folder / f"{name}.parquet", "parameters").set_index("mapping")
+    listed = read_table(folder / "uncertainties" / f"{name}.parquet", "uncertainties")
+    for mapping, row in parameters.iterrows():
+        more = listed[listed["mapping"] == mapping].set_index("parameter")["value"]
+        compared = parameter_errors(row, more, truth)
+        found |= {f"parametrise.{mapping}.{key}": value for key, value in compared.items()}
     return found | (label_errors(processed, source, name, truth) if name != source else {})
 
 
@@ -187,14 +203,17 @@ def _balanced_accuracy(found: np.ndarray, true: np.ndarray) -> float:
     return float((found[true].mean() + (~found[~true]).mean()) / 2.0)
 
 
-def parameter_errors(row: pd.Series, truth: Truth, inside_m: np.ndarray) -> dict[str, float]:
-    """Return relative errors of the scalars, the opening's error (mm) and that of the tilt reference (degrees).
+def parameter_errors(row: pd.Series, more: pd.Series, truth: Truth) -> dict[str, float]:
+    """Return relative errors of the scalars, the opening's error (mm) and those of the tilt references (degrees).
 
-    The tilt reference's truth is the same functional of the true hull, filled by `inside_m` (N, 3), at the true rim point
-    nearest to the warped lip.
+    `row` is of table `parameters`, `more` has the listed numbers by name. The tilt reference's truth is the same functional
+    of the true hull, at the true rim point nearest to the warped lip; that on the cavity is what hydrostatics says there.
     """
     true_value = {**truth.facts, "volume_m3": truth.facts["hull_volume_m3"]}
-    errors = {name: float(row[key] / true_value[key] - 1.0) for name, key in SCALARS.items()}
+    known = {**more, **row}
+    errors = {
+        name: float(known[key] / true_value[key] - 1.0) for name, key in SCALARS.items() if key in known
+    }
     rim_m = points(truth.cloud[truth.cloud["rim"]])
     opening_m = rim_m.mean(axis=0)
     found_m, lip_m = (
@@ -203,9 +222,20 @@ def parameter_errors(row: pd.Series, truth: Truth, inside_m: np.ndarray) -> dict
     )
     errors["opening_mm"] = float(np.linalg.norm(found_m - opening_m) * 1e3)
     true_lip_m = rim_m[np.argmin(np.linalg.norm(rim_m - lip_m, axis=1))]
-    true_tilt_rad = hulls.tilt_reference_rad(inside_m, true_lip_m, opening_m)
+    true_tilt_rad = hulls.tilt_reference_rad(truth.inside_m, true_lip_m, opening_m)
     errors["tilt_reference_deg"] = float(np.degrees(row["tilt_reference_rad"] - true_tilt_rad))
+    if "tilt_reference_cavity_rad" in more:
+        half_rad = half_emptied_rad(truth.cavity, lip_m)
+        errors["tilt_reference_cavity_deg"] = float(np.degrees(more["tilt_reference_cavity_rad"] - half_rad))
     return errors
+
+
+def half_emptied_rad(cup: Cavity, lip_m: np.ndarray) -> float:
+    """Return the tilt at which hydrostatics leaves half of a brimful cup, about its rim point nearest to a lip (3,)."""
+    own_lip_m = cup.rim_m[np.argmin(np.linalg.norm(cup.rim_m - lip_m, axis=1))]
+    tilts = np.radians(np.arange(0.0, 150.0, 0.5))
+    kept = retained_volume_m3(cup, own_lip_m, pour_axis(cup.opening_m, own_lip_m), tilts)
+    return float(np.interp(-cup.capacity_m3 / 2.0, -kept, tilts))
 
 
 if __name__ == "__main__":

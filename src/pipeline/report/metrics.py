@@ -66,6 +66,7 @@ def _headlines(found: dict[str, list[float]]) -> Metrics:
             tail = {
                 "opening_mm": "opening.error_mm_max",
                 "tilt_reference_deg": "tilt_reference.error_deg_max",
+                "tilt_reference_cavity_deg": "tilt_reference_cavity.error_deg_max",
             }
             mapping, what = key.split(".")[1:]
             metrics[f"parametrise.{mapping}.{tail.get(what, f'{what}.relative_error_max')}"] = worst

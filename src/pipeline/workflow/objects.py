@@ -10,7 +10,7 @@ from pipeline.workflow.configuration import nearest
 
 NAME = re.compile(r"[a-z0-9][a-z0-9_]*")
 # Files of the assembled tables beside parametrise/<source>/<object>.parquet.
-RESERVED = ("parameters", "tilt_references")
+RESERVED = ("parameters", "tilt_references", "uncertainties")
 SCANNED = re.compile(r"frame-\d{6}\.(depth\.png|pose\.txt)|camera-intrinsics\.txt")
 
 
