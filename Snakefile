@@ -16,6 +16,7 @@ rule all:
         "reports/roc.pdf",
         "reports/metrics.json",
         "reports/labels.pdf",
+        "reports/parameters.pdf",
         each("reports/scans/{object}.png"),
 
 

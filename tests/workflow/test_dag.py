@@ -10,6 +10,7 @@ from pipeline.track.store import client
 
 OBJECTS = {"mug", "short_cup", "wide_bowl"}
 ASSEMBLED = {"assemble_parameters", "assemble_tilt_references"}
+ESTIMATED = {"assemble_uncertainties", "draw_parameters"}
 CLASSIFIED = {"classify pouring", "classify filling", "report"}
 
 
@@ -19,20 +20,20 @@ def _each(rule: str, objects=frozenset(OBJECTS)) -> set[str]:
 
 FUSED = _each("fuse") | _each("draw_scan")
 SIMULATED = _each("simulate_pouring") | _each("simulate_filling") | CLASSIFIED
-CONTAINED = _each("simulate_container") | SIMULATED
+CONTAINED = _each("simulate_container") | SIMULATED | {"draw_parameters"}
 COMPARED = _each("accuracy")
 PARAMETRISED = _each("parametrise") | ASSEMBLED | COMPARED | CLASSIFIED
-UNCERTAIN = _each("uncertainties") | COMPARED | {"report"}
+UNCERTAIN = _each("uncertainties") | ESTIMATED | COMPARED | {"report"}
 WARPED = _each("warp") | PARAMETRISED | UNCERTAIN | {"draw_labels"}
 
 
 def _of_one(name: str) -> set[str]:
     """Return all that follows from the scan of an object that is neither source nor held."""
     stages = (
-        *("fuse", "draw_scan", "label", "warp", "parametrise"),
+        *("fuse", "draw_scan", "label", "warp", "parametrise", "uncertainties"),
         *("simulate_container", "simulate_pouring", "simulate_filling"),
     )
-    return {f"{stage} {name}" for stage in stages} | ASSEMBLED | CLASSIFIED | {"draw_labels"}
+    return {f"{stage} {name}" for stage in stages} | ASSEMBLED | ESTIMATED | CLASSIFIED | {"draw_labels"}
 
 
 def _runs(project) -> list:
@@ -191,7 +192,7 @@ def test_an_object_is_dropped_and_taken_away_again(project):
 
     (project / "data/raw/my_cup/cup.ply").unlink()
     (project / "data/raw/my_cup").rmdir()
-    assert project.planned() == ASSEMBLED | CLASSIFIED | {"draw_labels"}
+    assert project.planned() == ASSEMBLED | ESTIMATED | CLASSIFIED | {"draw_labels"}
     assert project.call().returncode == 0
     after = project.contents()
     assert [path for path in before if before[path] != after.get(path)] == []

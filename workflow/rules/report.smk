@@ -1,6 +1,7 @@
 # Needs the curves and scores of both experiments; for the numbers also what every stage made, and the demonstration objects' truth.
 # Makes report/accuracy/<object>.json, a demonstration object's errors against its truth.
 # Makes reports/roc.pdf (the paper's Fig. 3) with reports/metrics.json (every headline number), and reports/labels.pdf (Fig. 2);
+#       reports/parameters.pdf, every parameter on its object and against known values, and reports/parameters.json, volumes side by side;
 #       reports/scans/<object>.png, a page on each scan;
 #       when asked for, reports/physics.pdf and reports/physics.json, the liquid against hydrostatics and against Bullet's spheres.
 # How: one module a figure; truth is compared here and nowhere else.
@@ -78,6 +79,26 @@ rule draw_labels:
     shell:
         "python -m pipeline.report.labels --source-labels {input.source:q} --target-labels {input.initial:q}"
         " --label-mappings {input.final:q} --output {output.figure:q} > {log:q} 2>&1"
+
+
+rule draw_parameters:
+    input:
+        uncertainties=rules.assemble_uncertainties.output[0],
+        mappings=each(rules.warp.output.label),
+        containers=each(rules.simulate_container.output.container),
+        accuracy=each(rules.accuracy.output.errors, FOUND.demonstration),
+    output:
+        page=f"{REPORTS}/parameters.pdf",
+        numbers=f"{REPORTS}/parameters.json",
+    log:
+        "logs/report/parameters.log",
+    threads: 1
+    params:
+        code=code("pipeline.report.parameters"),
+    shell:
+        "python -m pipeline.report.parameters --uncertainties {input.uncertainties:q} --label-mappings {input.mappings:q}"
+        " --containers {input.containers:q} --accuracy {input.accuracy:q} --page {output.page:q} --numbers {output.numbers:q}"
+        " > {log:q} 2>&1"
 
 
 # The other engines' tables, by engine.
