@@ -4,7 +4,8 @@ from conftest import PARTS, sampled
 
 from pipeline.artefacts import points
 from pipeline.errors import PipelineError
-from pipeline.label.classifier import train, transfer_annotation
+from pipeline.label.annotation import transfer_annotation
+from pipeline.label.classifier import train
 from pipeline.label.features import neighbourhood_features
 from pipeline.label.paint import paint, read_strokes
 

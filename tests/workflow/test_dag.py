@@ -19,6 +19,7 @@ def _each(rule: str, objects=frozenset(OBJECTS)) -> set[str]:
 
 
 FUSED = _each("fuse") | _each("draw_scan")
+LABELLED = {"learn"} | _each("label")
 SIMULATED = _each("simulate_pouring") | _each("simulate_filling") | CLASSIFIED
 CONTAINED = _each("simulate_container") | SIMULATED | {"draw_parameters"}
 COMPARED = _each("accuracy")
@@ -82,9 +83,9 @@ def test_one_core_gives_the_same_bytes_as_two(finished, unfinished):
 @pytest.mark.parametrize(
     ("key", "value", "jobs"),
     [
-        ("scan.noise", 0.5, _each("scan") | FUSED | _each("label") | WARPED | CONTAINED),
-        ("fuse.points", 7000, FUSED | _each("label") | WARPED | CONTAINED),
-        ("label.ridge", 2.0, _each("label") | WARPED),
+        ("scan.noise", 0.5, _each("scan") | FUSED | LABELLED | WARPED | CONTAINED),
+        ("fuse.points", 7000, FUSED | LABELLED | WARPED | CONTAINED),
+        ("label.ridge", 2.0, LABELLED | WARPED),
         ("warp.k", 2, WARPED),
         ("parametrise.hull_points", 3000, PARAMETRISED | UNCERTAIN),
         ("parametrise.redraws", 3, UNCERTAIN),
@@ -132,8 +133,8 @@ def test_two_keys_that_swap_their_values_are_a_change(project):
 @pytest.mark.parametrize(
     ("module", "jobs"),
     [
-        ("scan/camera.py", _each("scan") | FUSED | _each("label") | WARPED | CONTAINED),
-        ("label/features.py", _each("label") | WARPED),
+        ("scan/camera.py", _each("scan") | FUSED | LABELLED | WARPED | CONTAINED),
+        ("label/features.py", LABELLED | WARPED),
         ("simulate/trials.py", SIMULATED),
         ("simulate/fields.py", CONTAINED),
         ("classify/regression.py", CLASSIFIED),
@@ -171,7 +172,7 @@ def test_a_changed_annotation_reruns_the_labels(project):
     path = project / "config/annotations/mug.parquet"
     table = read_table(path, "annotation")
     table.iloc[:-1].to_parquet(path, index=False)
-    assert project.planned() == _each("label") | WARPED
+    assert project.planned() == LABELLED | WARPED
 
 
 def test_an_object_is_dropped_and_taken_away_again(project):

@@ -3,29 +3,22 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
-from sklearn.linear_model import LogisticRegression
-from sklearn.pipeline import Pipeline, make_pipeline
-from sklearn.preprocessing import StandardScaler
-
-from pipeline.errors import PipelineError
 
 PARTS = ("container", "rim", "handle")
+SURE = 800.0  # the logit of what the source is all or nothing of
 
 
 @dataclass(frozen=True)
 class PartClassifier:
-    """Three independent classifiers of a point's neighbourhood; a constant where the source is all or nothing of a part."""
+    """Three independent classifiers of a point's neighbourhood: logit = features · weights (F, 3) + offsets (3,)."""
 
-    models: tuple[Pipeline | float, ...]
+    weights: np.ndarray
+    offsets: np.ndarray
 
     def probabilities(self, features: np.ndarray) -> np.ndarray:
         """Return p(part) of points with features (N, F) as (N, 3), in the order of `PARTS`."""
-        columns = [
-            np.full(len(features), model) if isinstance(model, float) else model.predict_proba(features)[:, 1]
-            for model in self.models
-        ]
-        return np.column_stack(columns)
+        logit = features @ self.weights + self.offsets
+        return 0.5 * (1.0 + np.tanh(logit / 2.0))
 
 
 def train(features: np.ndarray, parts: np.ndarray, ridge: float) -> PartClassifier:
@@ -34,32 +27,18 @@ def train(features: np.ndarray, parts: np.ndarray, ridge: float) -> PartClassifi
     The ridge is large because neighbouring points are far from independent: a scan holds some hundred neighbourhoods,
     not as many as it has points, and weights that trust every point are sure of themselves on other objects, and wrong.
     """
-    return PartClassifier(tuple(_train(features, part, ridge) for part in parts.T))
+    weights, offsets = zip(*(_train(features, part, ridge) for part in parts.T), strict=True)
+    return PartClassifier(np.column_stack(weights), np.array(offsets))
 
 
-def _train(features: np.ndarray, part: np.ndarray, ridge: float) -> Pipeline | float:
+def _train(features: np.ndarray, part: np.ndarray, ridge: float) -> tuple[np.ndarray, float]:
     if part.all() or not part.any():
-        return float(part[0])
+        return np.zeros(features.shape[1]), SURE if part[0] else -SURE
+    from sklearn.linear_model import LogisticRegression
+    from sklearn.preprocessing import StandardScaler
+
+    scaler = StandardScaler().fit(features)
     regression = LogisticRegression(C=1.0 / ridge, solver="newton-cholesky", class_weight="balanced")
-    return make_pipeline(StandardScaler(), regression).fit(features, part)
-
-
-def transfer_annotation(
-    painted_m: np.ndarray,
-    painted_parts: np.ndarray,
-    points_m: np.ndarray,
-    *,
-    name: str,
-    reach_m: float = 0.01,
-) -> np.ndarray:
-    """Return the parts (N, 3) of points (N, 3): those of the nearest painted point (M, 3), (M, 3 bool).
-
-    Raises PipelineError where the annotation and the scan do not lie on each other (median distance over `reach_m`).
-    """
-    distance, index = cKDTree(painted_m).query(points_m)
-    if np.median(distance) > reach_m:
-        raise PipelineError(
-            f"{name}: the annotated points should lie on the scan of the source, but are {np.median(distance):.3f} m away "
-            "(median); annotate this scan, in its own world frame and in metres"
-        )
-    return painted_parts[index]
+    regression.fit(scaler.transform(features), part)
+    weights = regression.coef_[0] / scaler.scale_
+    return weights, float(regression.intercept_[0] - weights @ scaler.mean_)
