@@ -1,0 +1,49 @@
+"""The commands of the stage, as the workflow calls them."""
+
+import subprocess
+import sys
+
+import pytest
+from conftest import sampled
+
+from pipeline.artefacts import read_table, write_table
+
+
+@pytest.fixture(scope="module")
+def mapping(tmp_path_factory):
+    path = tmp_path_factory.mktemp("warp") / "mapping.parquet"
+    rows = range(len(sampled("short_cup")))
+    table = sampled("short_cup").assign(source_index=rows, target_index=rows, valid=True)
+    names = ["x_m", "y_m", "z_m", "nx", "ny", "nz", "area_m2", "container", "rim", "handle"]
+    write_table(path, table[[*names, "source_index", "target_index", "valid"]], "mapping")
+    return path
+
+
+def _call(module: str, mapping, *arguments: str) -> subprocess.CompletedProcess:
+    given = ["--object", "short_cup", "--point-mapping", str(mapping), "--label-mapping", str(mapping)]
+    return subprocess.run(
+        [sys.executable, "-m", module, *given, *arguments], capture_output=True, text=True, check=False
+    )
+
+
+def test_uncertainties_are_the_same_bytes_again(mapping, tmp_path):
+    listed = ["--redraws", "3", "--hull-points", "500", "--parameters", "radius_m", "spout_direction"]
+    paths = [tmp_path / name for name in ("one.parquet", "two.parquet")]
+    for path in paths:
+        told = _call("pipeline.parametrise.uncertainty", mapping, "--uncertainties", str(path), *listed)
+        assert told.returncode == 0, told.stderr
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+    table = read_table(paths[0], "uncertainties")
+    assert list(table["parameter"]) == ["radius_m", "spout_direction_x", "spout_direction_y"] * 2
+    assert (table["std"] > 0.0).all()
+
+
+def test_a_typo_is_refused_in_one_sentence_and_nothing_is_written(mapping, tmp_path):
+    path = tmp_path / "out.parquet"
+    told = _call(
+        "pipeline.parametrise.uncertainty", mapping, "--uncertainties", str(path), "--parameters", "radus_m"
+    )
+    assert told.returncode == 1
+    assert told.stderr.startswith("error: parameter 'radus_m' is unknown")
+    assert told.stderr.count("\n") == 1
+    assert not path.exists()
