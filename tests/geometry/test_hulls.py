@@ -1,15 +1,14 @@
 import numpy as np
 import pytest
 
-from pipeline.geometry.hulls import hull_volume_m3, points_in_hull, tilt_reference_rad
+from pipeline.geometry.hulls import points_in_hull, tilt_reference_rad
 
 BOX = np.array([[x, y, z] for x in (-0.03, 0.03) for y in (-0.04, 0.04) for z in (0.0, 0.1)])
 
 
-def test_volume_and_filling_of_a_box():
+def test_filling_of_a_box():
     inside = points_in_hull(BOX, 20000)
-    assert hull_volume_m3(BOX) == pytest.approx(0.06 * 0.08 * 0.1)
-    assert 15000 < len(inside) < 45000
+    assert 19800 < len(inside) < 20200
     np.testing.assert_allclose(inside.mean(axis=0), [0.0, 0.0, 0.05], atol=1e-4)
     np.testing.assert_allclose(inside.var(axis=0), np.array([0.06, 0.08, 0.1]) ** 2 / 12, rtol=0.01)
 

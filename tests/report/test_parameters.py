@@ -7,17 +7,25 @@ from conftest import sampled
 from parametrise.clouds import cloud
 
 from pipeline.artefacts import points
+from pipeline.geometry.cavity import cavity
 from pipeline.parametrise.parameters import PARAMETERS
 from pipeline.parametrise.uncertainty import estimates
 from pipeline.report.parameters_page import Drawn, drawings
 from pipeline.report.parameters_table import table
-from pipeline.report.volumes import biases, volumes
+from pipeline.report.volumes import biases, comparison, volumes
+from pipeline.scan.shapes import shape
 
 CONTAINER = {
     "cavity_capacity_m3": np.array(400e-6),
     "spacing_m": np.array(0.01),
     "settled_keys": np.array([-1, 0, 8]),
     "settled_counts": np.array([412, 404, 8]),
+}
+
+JUG = shape("jug")
+CAVITY = {
+    f"cavity_{name}": np.asarray(value)
+    for name, value in vars(cavity(JUG.vertices_m, JUG.triangles, name="jug")).items()
 }
 
 
@@ -66,6 +74,21 @@ def test_every_parameter_that_has_a_picture_is_drawn_and_the_lip_is_where_it_is(
 def test_what_is_not_listed_is_not_drawn():
     axis = drawings([_drawn(_listed(["opening_m", "lip_m", "height_m"]))]).axes[0]
     assert set(axis.get_legend_handles_labels()[1]) == {"height", "lip"}
+    listed = _listed(["wall_m"])
+    assert not drawings([_drawn(listed)]).axes[0].collections
+    found = volumes(listed, {"jug": CONTAINER}, {})
+    kept = comparison(found, [_drawn(listed)], {"jug": CAVITY}).axes[1]
+    assert kept.get_title() == "jug"
+    assert not kept.lines
+
+
+def test_what_is_kept_is_drawn_beside_what_hydrostatics_says():
+    listed = _listed(["lip_m", "opening_m", "retained_m3"])
+    figure = comparison(volumes(listed, {"jug": CONTAINER}, {}), [_drawn(listed)], {"jug": CAVITY})
+    mapped, hydrostatic = (line.get_xydata() for line in figure.axes[1].lines)
+    assert mapped[0] == pytest.approx([0.0, 100.0])
+    said = np.interp(mapped[:, 0], *hydrostatic.T)
+    np.testing.assert_allclose(mapped[:, 1], said, atol=3.0)
 
 
 def test_the_table_has_value_uncertainty_and_the_known_error():

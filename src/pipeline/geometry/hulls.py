@@ -1,4 +1,4 @@
-"""Convex hulls: their volume, points inside them, and the tilt that raises half of them above a lip."""
+"""Convex hulls: points inside them, and the tilt that raises half of them above a lip."""
 
 import numpy as np
 from scipy.spatial import ConvexHull
@@ -6,11 +6,6 @@ from scipy.spatial import ConvexHull
 # 1/g, 1/g², 1/g³ with g⁴ = g + 1: the steps of the R3 sequence, Roberts 2018, "The unreasonable effectiveness of quasirandom
 # sequences", whose points leave no gaps.
 _STEPS = 1.2207440846057596 ** -np.arange(1.0, 4.0)
-
-
-def hull_volume_m3(points_m: np.ndarray) -> float:
-    """Return the volume of the convex hull of points (N, 3)."""
-    return float(ConvexHull(points_m).volume)
 
 
 def points_in_hull(points_m: np.ndarray, n: int) -> np.ndarray:

@@ -64,7 +64,7 @@ def retained_m3(kept_m3: np.ndarray) -> np.ndarray:
 def tilt_reference_cavity_rad(kept_m3: np.ndarray) -> float:
     """Tilt reference on the cavity: the tilt at which half of the capacity is left, V(θ) = V(0)/2."""
     half = kept_m3[0] / 2.0
-    after = int(np.argmax(kept_m3 <= half))
+    after = max(1, int(np.argmax(kept_m3 <= half)))
     return float(np.interp(-half, -kept_m3[after - 1 : after + 1], _TILTS_RAD[after - 1 : after + 1]))
 
 

@@ -4,7 +4,10 @@ import numpy as np
 
 from pipeline.parametrise.library import parameter
 
-FOOT_M = 0.0015  # what is this near to the table carries
+FOOT_M, FOOT_SHARE = (
+    0.0015,
+    0.005,
+)  # what is this near to the table carries, and this share of all points at least
 
 
 @parameter("rad")
@@ -18,6 +21,7 @@ def stability_rad(points_m: np.ndarray, area_m2: np.ndarray) -> float:
 
     centre = area_m2 @ points_m / area_m2.sum()
     low = points_m[:, 2].min()
-    base = ConvexHull(points_m[points_m[:, 2] < low + FOOT_M, :2])
+    foot = max(low + FOOT_M, np.quantile(points_m[:, 2], FOOT_SHARE))
+    base = ConvexHull(points_m[points_m[:, 2] <= foot, :2])
     distance = -(base.equations[:, :2] @ centre[:2] + base.equations[:, 2])
     return float(np.arctan2(distance.min(), centre[2] - low))

@@ -83,7 +83,8 @@ def comparison(found: pd.DataFrame, objects: "Sequence[Drawn]", containers: Mapp
             axis.set_axis_off()
         for axis, drawn in zip(axes.flat, objects, strict=False):
             _kept(axis, drawn, _cavity(containers[drawn.name]))
-        axes[0, 0].legend(frameon=False, fontsize=6)
+        if axes[0, 0].lines:
+            axes[0, 0].legend(frameon=False, fontsize=6)
         lower.supxlabel("tilt, degrees", fontsize=8)
         lower.supylabel("kept of the capacity, %", fontsize=8)
     return figure
@@ -121,6 +122,8 @@ def _kept(axis: "Axes", drawn: "Drawn", cup: Cavity) -> None:
         axis.plot(tilts_deg, 100 * kept / kept[0], "o-", ms=2.5, lw=1, color="#0072B2", label="label mapping")
         low, high = (100 * (kept + sign * 2 * spread) / kept[0] for sign in (-1, 1))
         axis.fill_between(tilts_deg, low, high, color="#0072B2", alpha=0.25, lw=0)
+    if "lip_x_m" not in drawn.values:  # not listed: about which lip is not known
+        return
     lip_m = drawn.vector_mm("lip") * 1e-3
     lip_m = cup.rim_m[np.argmin(np.linalg.norm(cup.rim_m - lip_m, axis=1))]
     tilts_deg = np.arange(0.0, 121.0, 3.0)
