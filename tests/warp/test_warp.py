@@ -2,35 +2,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import PARTS, sampled
+from warp.bodies import cloud, iou, moved
 
-from pipeline.artefacts import normals, points
 from pipeline.errors import PipelineError
-from pipeline.geometry.frames import rotation_about
 from pipeline.warp.alignment import part_frame
+from pipeline.warp.clouds import Cloud
 from pipeline.warp.nearest import agreeing_neighbours, majority_of_neighbours
+from pipeline.warp.nearest_neighbour import fit as fit_by
+from pipeline.warp.quality import quality
 from pipeline.warp.stretch import between_extents, linear
-from pipeline.warp.warp import Cloud, fit, label_mapping, point_mapping, wall_side_flips
+from pipeline.warp.warp import Warp
 
 
-def cloud(name: str) -> Cloud:
-    table = sampled(name)
-    parts = table[PARTS].to_numpy()
-    return Cloud(name, points(table), normals(table), table["area_m2"].to_numpy(), parts)
-
-
-def moved(body: Cloud, yaw_rad: float, scale: float, shift_m: tuple[float, float, float]) -> Cloud:
-    R = rotation_about(np.array([0.0, 0.0, 1.0]), yaw_rad)
-    return replace(
-        body,
-        points_m=scale * body.points_m @ R.T + shift_m,
-        normals=body.normals @ R.T,
-        area_m2=scale**2 * body.area_m2,
-    )
-
-
-def iou(found: np.ndarray, true: np.ndarray) -> float:
-    return float((found & true).sum() / (found | true).sum())
+def fit(source: Cloud, target: Cloud, refinements: int) -> Warp:
+    return fit_by(source, target, rng=np.random.default_rng(0), refinements=refinements)
 
 
 def test_part_frame_points_to_the_rim_and_to_the_handle():
@@ -84,7 +69,7 @@ def test_a_kept_rim_is_moved_not_stretched():
 def test_the_same_object_moved_and_scaled_gets_its_labels_back(yaw_rad, scale):
     source = cloud("mug")
     target = moved(source, yaw_rad, scale, (0.1, -0.3, 0.0))
-    mapped = label_mapping(fit(source, target, refinements=0), k=1)
+    mapped = fit(source, target, refinements=0).map_labels(1)
     assert (mapped.cloud.parts == source.parts).mean() > 0.999
     np.testing.assert_array_equal(mapped.source_index, np.arange(len(source.points_m)))
 
@@ -105,11 +90,11 @@ def test_normals_follow_the_inverse_transpose():
 def test_rims_are_found_on_other_objects_and_no_wall_is_crossed(name):
     source, target = cloud("mug"), cloud(name)
     warp = fit(source, target, refinements=5)
-    labels, pts = label_mapping(warp, k=1), point_mapping(warp, k=1)
+    labels = warp.map_labels(1)
     assert iou(labels.cloud.parts[:, 1], target.parts[:, 1]) > 0.6
-    assert wall_side_flips(warp, labels) == wall_side_flips(warp, pts) == 0.0
-    assert labels.valid.all()
-    assert pts.valid.all()
+    for mapped in (labels, warp.map_cloud(1)):
+        assert quality(warp, mapped)["wall_side_flips"] == 0.0
+        assert mapped.valid.all()
 
 
 def test_neighbours_across_the_wall_are_passed_over():
