@@ -19,7 +19,7 @@ rule warp:
         "benchmarks/warp/{source}/{object}.tsv"
     threads: 1
     params:
-        options=options("warp", "method", "k", "refinements", "seed"),
+        options=options("warp", "method", "k", "refinements", "bends", "seed"),
         code=code("pipeline.warp"),
     shell:
         "python -m pipeline.warp --source-labels {input.source:q} --target-labels {input.target:q}"

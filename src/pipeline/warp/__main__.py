@@ -29,6 +29,7 @@ def main() -> None:
     parser.add_argument(
         "--refinements", type=int, default=5, help="refinements of nearest_neighbour; the paper has none"
     )
+    parser.add_argument("--bends", type=int, default=1, help="bends of nearest_neighbour; the paper has none")
     parser.add_argument("--seed", type=int, default=3, help="of methods that draw points")
     options = parser.parse_args()
 
@@ -52,7 +53,7 @@ def _fit(options) -> "Warp":  # type: ignore[no-untyped-def]
             f"--method: expected one of {' '.join(METHODS)}, found '{options.method}'; correct warp.method"
         )
     source, target = _cloud(options.source_labels), _cloud(options.target_labels)
-    own = {"nearest_neighbour": {"refinements": options.refinements}}
+    own = {"nearest_neighbour": {"refinements": options.refinements, "bends": options.bends}}
     rng = np.random.default_rng([options.seed, crc32(target.name.encode())])
     return METHODS[options.method](source, target, rng=rng, **own.get(options.method, {}))
 

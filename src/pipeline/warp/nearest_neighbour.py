@@ -5,33 +5,47 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.geometry import frames
+from pipeline.warp import splines
 from pipeline.warp.alignment import PartFrame, part_frame, scale
 from pipeline.warp.clouds import Cloud, thinned
-from pipeline.warp.deformation import PartStretch
+from pipeline.warp.deformation import Chain, Deformation, Kernels, PartStretch
 from pipeline.warp.stretch import Stretch, between_extents, linear
 from pipeline.warp.warp import Warp, label_pairs, point_pairs
 
 NAME = "nearest_neighbour"
 REFINEMENT_POINTS = 4000
+BEND_CENTRES, BEND_STIFFNESS = 150, 1e-3
 
 
-def fit(source: Cloud, target: Cloud, *, rng: np.random.Generator, refinements: int = 5) -> Warp:
+def fit(
+    source: Cloud, target: Cloud, *, rng: np.random.Generator, refinements: int = 5, bends: int = 1
+) -> Warp:
     """Align the source with the target by part frames and give its container the target's variances (the paper's).
 
     With refinements, which the paper does not have: along the first axis the container gets the target's extent
     instead, because equal variances leave the lips of a mug and a bowl apart, and the rim keeps its thickness; across,
     nearest points with agreeing normals, paired both ways, are brought together by a factor and an offset an axis.
+    With bends, which the paper does not have either, a thin-plate spline then takes the pairs to each other: no factors
+    make a bowl of a mug.
     """
     warp = coarse(source, target)
-    if not refinements:
-        return warp
+    if refinements:
+        warp = _refine(warp, refinements)
+    stretched = warp.deformation
+    for _ in range(bends):
+        warp = replace(warp, deformation=Chain(stretched, _bend(warp, stretched)))
+    return replace(warp, diagnostics={"refinements": float(refinements), "bends": float(bends)})
+
+
+def _refine(warp: Warp, refinements: int) -> Warp:
+    source, target = warp.source, warp.target
     here, there = _extent(source, warp.source_frame), _extent(target, warp.target_frame)
     rim = source.points_m[source.parts[:, 1]]
     rim_m = here[1] - np.quantile(_in_part_frame(rim, warp.source_frame)[:, 0], 0.02)
     stretch = between_extents(here, there, rim_m, scale(warp.source_frame, warp.target_frame))
     for _ in range(refinements):
         stretch = _refined(_with(warp, stretch), stretch)
-    return replace(_with(warp, stretch), diagnostics={"refinements": float(refinements)})
+    return _with(warp, stretch)
 
 
 def coarse(source: Cloud, target: Cloud) -> Warp:
@@ -59,6 +73,24 @@ def _extent(cloud: Cloud, frame: PartFrame) -> np.ndarray:
 
 def _refined(warp: Warp, stretch: Stretch) -> Stretch:
     """Return the stretch with the factors and offsets across the first axis that fit the warp's present pairs best."""
+    thin, from_rows, to_rows = _pairs(warp)
+    x = _in_part_frame(thin.source.points_m[from_rows], warp.source_frame)[:, 1:]
+    y = _in_part_frame(thin.target.points_m[to_rows], warp.target_frame)[:, 1:]
+    mean_x, mean_y = x.mean(axis=0), y.mean(axis=0)
+    factors = ((x - mean_x) * (y - mean_y)).sum(axis=0) / ((x - mean_x) ** 2).sum(axis=0)
+    return replace(stretch, scale=factors, offset_m=mean_y - factors * mean_x)
+
+
+def _bend(warp: Warp, stretched: Deformation) -> Kernels:
+    """Return the spline that takes the stretched source to the target, by the warp's present pairs."""
+    thin, from_rows, to_rows = _pairs(warp)
+    here_m = stretched.map(thin.source.points_m)
+    step = max(1, len(here_m) // BEND_CENTRES)
+    return splines.fit(here_m[from_rows], thin.target.points_m[to_rows], here_m[::step], BEND_STIFFNESS)
+
+
+def _pairs(warp: Warp) -> tuple[Warp, np.ndarray, np.ndarray]:
+    """Return the warp of thinned clouds and the rows of its source and target that pair, both ways."""
     thin = replace(
         warp, source=thinned(warp.source, REFINEMENT_POINTS), target=thinned(warp.target, REFINEMENT_POINTS)
     )
@@ -66,9 +98,4 @@ def _refined(warp: Warp, stretch: Stretch) -> Stretch:
     # A handle has no counterpart on a target without one.
     usable = ~thin.source.parts[:, 2] | warp.target_frame.roll_observable
     forth, home = np.flatnonzero((there >= 0) & usable), np.flatnonzero((back >= 0) & usable[back])
-    x = _in_part_frame(thin.source.points_m, warp.source_frame)[:, 1:]
-    y = _in_part_frame(thin.target.points_m, warp.target_frame)[:, 1:]
-    x, y = np.vstack([x[forth], x[back[home]]]), np.vstack([y[there[forth]], y[home]])
-    mean_x, mean_y = x.mean(axis=0), y.mean(axis=0)
-    factors = ((x - mean_x) * (y - mean_y)).sum(axis=0) / ((x - mean_x) ** 2).sum(axis=0)
-    return replace(stretch, scale=factors, offset_m=mean_y - factors * mean_x)
+    return thin, np.concatenate([forth, back[home]]), np.concatenate([there[forth], home])
