@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from warp.bodies import cloud, iou, moved
+from warp.bodies import cloud, iou, moved, turned
 
 from pipeline.errors import PipelineError
 from pipeline.warp.alignment import part_frame
@@ -20,8 +20,8 @@ def fit(source: Cloud, target: Cloud, refinements: int, bends: int = 0) -> Warp:
 
 def test_part_frame_points_to_the_rim_and_to_the_handle():
     mug = cloud("mug")
-    turned = moved(mug, 0.7, 1.0, (0.02, -0.01, 0.0))
-    frame, other = (part_frame(body.points_m, body.parts, name="mug") for body in (mug, turned))
+    other = moved(mug, 0.7, 1.0, (0.02, -0.01, 0.0))
+    frame, other = (part_frame(body) for body in (mug, other))
     np.testing.assert_allclose(other.T_object_part[:3, 0], [0.0, 0.0, 1.0])
     turn = np.arctan2(*other.T_object_part[1::-1, 1]) - np.arctan2(*frame.T_object_part[1::-1, 1])
     assert turn % (2 * np.pi) == pytest.approx(0.7, abs=0.01)
@@ -31,23 +31,24 @@ def test_part_frame_points_to_the_rim_and_to_the_handle():
 
 def test_a_round_cup_has_no_observable_roll():
     cup = cloud("short_cup")
-    assert not part_frame(cup.points_m, cup.parts, name=cup.name).roll_observable
+    assert not part_frame(cup).roll_observable
 
 
 def test_a_base_edge_taken_for_rim_does_not_flip_the_frame():
     cup = cloud("short_cup")
     parts = cup.parts.copy()
     parts[:, 1] |= (cup.points_m[:, 2] < 0.004) & (np.linalg.norm(cup.points_m[:, :2], axis=1) > 0.03)
-    frame = part_frame(cup.points_m, parts, name=cup.name)
+    frame = part_frame(replace(cup, parts=parts))
     np.testing.assert_allclose(frame.T_object_part[:3, 0], [0.0, 0.0, 1.0])
 
 
 def test_an_upside_down_cup_is_named():
     cup = cloud("short_cup")
     with pytest.raises(
-        PipelineError, match=r"short_cup: expected an upright container.*1[78][0-9]° from the top"
+        PipelineError,
+        match=r"short_cup: expected an upright.*upside down: its rim lies 1[78][0-9]° from the top",
     ):
-        part_frame(cup.points_m * [1, -1, -1], cup.parts, name=cup.name)
+        part_frame(turned(cup, np.diag([1.0, -1.0, -1.0]), 1.0, np.zeros(3)))
 
 
 def test_the_stretch_gives_the_container_the_target_s_variances():

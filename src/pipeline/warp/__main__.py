@@ -94,6 +94,8 @@ def _alignment(warp: "Warp", mapped: "dict[str, Mapped]") -> dict:
         "T_target_part": warp.target_frame.T_object_part.tolist(),
         "scale": warp.scale.tolist(),
         "roll_observable": warp.target_frame.roll_observable,
+        "roll_symmetry": warp.target_frame.roll_symmetry,
+        "handles": warp.target_frame.handles,
         "cost_m": warp.cost_m,
         "diagnostics": warp.diagnostics,
         "wall_side_flips_without_check": unchecked_flips(warp),

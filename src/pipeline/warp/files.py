@@ -13,7 +13,7 @@ from pipeline.warp.deformation import Chain, Deformation, Kernels, PartStretch
 from pipeline.warp.stretch import Stretch
 from pipeline.warp.warp import Warp
 
-FRAME = ("T_object_part", "spread_m", "roll_observable")
+FRAME = ("T_object_part", "spread_m", "roll_symmetry", "handles")
 KERNELS = ("affine", "offset_m", "centres_m", "weights", "width_m")
 STRETCH = ("knots_m", "scale", "offset_m")
 

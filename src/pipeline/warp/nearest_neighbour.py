@@ -50,8 +50,8 @@ def _refine(warp: Warp, refinements: int) -> Warp:
 
 def coarse(source: Cloud, target: Cloud) -> Warp:
     """Return the paper's first stage: part frame onto part frame, the container scaled to the target's variances."""
-    source_frame = part_frame(source.points_m, source.parts, name=source.name)
-    target_frame = part_frame(target.points_m, target.parts, name=target.name)
+    source_frame = part_frame(source)
+    target_frame = part_frame(target)
     stretch = linear(scale(source_frame, target_frame))
     deformation = PartStretch(source_frame.T_object_part, target_frame.T_object_part, stretch)
     return Warp(NAME, source, target, source_frame, target_frame, deformation)
@@ -96,6 +96,6 @@ def _pairs(warp: Warp) -> tuple[Warp, np.ndarray, np.ndarray]:
     )
     there, back = point_pairs(thin, 1)[0][:, 0], label_pairs(thin, 1)[0][:, 0]
     # A handle has no counterpart on a target without one.
-    usable = ~thin.source.parts[:, 2] | warp.target_frame.roll_observable
+    usable = ~thin.source.parts[:, 2] | (warp.target_frame.handles > 0)
     forth, home = np.flatnonzero((there >= 0) & usable), np.flatnonzero((back >= 0) & usable[back])
     return thin, np.concatenate([forth, back[home]]), np.concatenate([there[forth], home])
