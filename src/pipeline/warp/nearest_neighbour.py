@@ -24,7 +24,8 @@ def fit(
 
     With refinements, which the paper does not have: along the first axis the container gets the target's extent
     instead, because equal variances leave the lips of a mug and a bowl apart, and the rim keeps its thickness; across,
-    nearest points with agreeing normals, paired both ways, are brought together by a factor and an offset an axis.
+    nearest points with agreeing normals, paired both ways, are brought together by a factor and an offset an axis. A
+    target that the source fits as well at another size is the same thing at that size, and its rim is scaled, too.
     With bends, which the paper does not have either, a thin-plate spline then takes the pairs to each other: no factors
     make a bowl of a mug.
     """
@@ -45,7 +46,17 @@ def _refine(warp: Warp, refinements: int) -> Warp:
     stretch = between_extents(here, there, rim_m, scale(warp.source_frame, warp.target_frame))
     for _ in range(refinements):
         stretch = _refined(_with(warp, stretch), stretch)
-    return _with(warp, stretch)
+    refined = _with(warp, stretch)
+    size = np.linalg.norm(warp.target_frame.spread_m) / np.linalg.norm(warp.source_frame.spread_m)
+    same = _with(warp, linear(np.full(3, size)))
+    return same if _between_planes_m(same) <= _between_planes_m(refined) else refined
+
+
+def _between_planes_m(warp: Warp) -> float:
+    """Return the mean distance of paired points along the target's normals: how far apart the surfaces are."""
+    thin, from_rows, to_rows = _pairs(warp)
+    apart_m = thin.target.points_m[to_rows] - thin.aligned.points_m[from_rows]
+    return float(np.mean(np.abs(np.einsum("nc,nc->n", apart_m, thin.target.normals[to_rows]))))
 
 
 def coarse(source: Cloud, target: Cloud) -> Warp:

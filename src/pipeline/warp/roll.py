@@ -101,7 +101,7 @@ def outline(ring_m: np.ndarray) -> tuple[float, int]:
     The azimuth is that of the corner nearest to +x; of a single bulge, a spout, that of the opposite side, where handles are;
     and 0 on a round rim.
     """
-    offset = ring_m[:, :2] - (ring_m[:, :2].max(axis=0) + ring_m[:, :2].min(axis=0)) / 2.0
+    offset = ring_m[:, :2] - _middle(ring_m[:, :2])
     azimuth = np.arctan2(offset[:, 1], offset[:, 0]) % (2 * np.pi)
     centres = (np.arange(SECTORS) + 0.5) * 2 * np.pi / SECTORS
     sector = np.minimum((azimuth / (2 * np.pi) * SECTORS).astype(int), SECTORS - 1)
@@ -119,3 +119,17 @@ def outline(ring_m: np.ndarray) -> tuple[float, int]:
         return float(phase + np.pi), 1
     turns = phase + 2 * np.pi * np.arange(symmetry) / symmetry
     return float(turns[np.argmax(np.cos(turns).round(9))]), symmetry
+
+
+def _middle(ring_m: np.ndarray) -> np.ndarray:
+    """Return the centre (2,) of the circle that most points (M, 2) lie on: Kåsa's fit, reweighted for least absolute distances."""
+    mean_m = ring_m.mean(axis=0)
+    size_m = float(ring_m.std())
+    x = (ring_m - mean_m) / size_m
+    design, right = np.column_stack([2.0 * x, np.ones(len(x))]), (x**2).sum(axis=1)
+    weight = np.ones(len(x))
+    for _ in range(20):
+        root = np.sqrt(weight)[:, None]
+        solved = np.linalg.lstsq(design * root, right * root[:, 0])[0]
+        weight = 1.0 / np.maximum(np.abs(design @ solved - right), 0.02)
+    return mean_m + size_m * solved[:2]
