@@ -17,6 +17,7 @@ rule all:
         "reports/metrics.json",
         "reports/labels.pdf",
         each("reports/scans/{object}.png"),
+        expand(f"{PROCESSED}/parametrise/{{source}}/parameters.parquet", source=FURTHER_SOURCES),
 
 
 include: "workflow/rules/scan.smk"

@@ -6,8 +6,8 @@
 
 rule warp:
     input:
-        source=expand(rules.label.output.labels, object=SOURCE)[0],
-        target=rules.label.output.labels,
+        source=lambda wildcards: labels_from(wildcards.source, wildcards.source),
+        target=lambda wildcards: labels_from(wildcards.source, wildcards.object),
     output:
         point=f"{PROCESSED}/warp/{{source}}/{{object}}/point_mapping.parquet",
         label=f"{PROCESSED}/warp/{{source}}/{{object}}/label_mapping.parquet",
