@@ -18,6 +18,7 @@ rule all:
         "reports/labels.pdf",
         "reports/parameters.pdf",
         each("reports/scans/{object}.png"),
+        expand(f"{PROCESSED}/parametrise/{{source}}/parameters.parquet", source=FURTHER_SOURCES),
 
 
 include: "workflow/rules/scan.smk"

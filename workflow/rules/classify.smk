@@ -7,8 +7,8 @@
 rule classify:
     input:
         trials=each(f"{PROCESSED}/simulate/{{{{experiment}}}}/{{object}}/trials.parquet"),
-        parameters=rules.assemble_parameters.output[0],
-        tilt_references=rules.assemble_tilt_references.output[0],
+        parameters=expand(rules.assemble_parameters.output, source=SOURCE)[0],
+        tilt_references=expand(rules.assemble_tilt_references.output, source=SOURCE)[0],
     output:
         predictions=f"{PROCESSED}/classify/{{experiment}}/predictions.parquet",
         scores=f"{PROCESSED}/classify/{{experiment}}/scores.parquet",

@@ -27,7 +27,8 @@ try:
     config.update(configuration.typed(config, schema))
     configuration.check(config, schema)
     FOUND = objects.find(RAW, config)
-    SOURCE = config["objects"]["source"]
+    # The first source is the one that classifiers and figures take; further ones are warped and measured beside it.
+    SOURCE, *FURTHER_SOURCES = objects.sources(config)
     ANNOTATION = configuration.check_annotation("config/annotations", SOURCE)
 except PipelineError as error:
     sys.exit(f"error: {error}")
@@ -68,5 +69,5 @@ def each(pattern, names=OBJECTS):
 
 wildcard_constraints:
     object="|".join(OBJECTS),
-    source=SOURCE,
+    source="|".join(OBJECTS),
     experiment="|".join(EXPERIMENTS),

@@ -45,11 +45,11 @@ rule uncertainties:
 
 rule assemble_parameters:
     input:
-        each(rules.parametrise.output.parameters),
+        expand(rules.parametrise.output.parameters, object=OBJECTS, allow_missing=True),
     output:
-        f"{PROCESSED}/parametrise/{SOURCE}/parameters.parquet",
+        f"{PROCESSED}/parametrise/{{source}}/parameters.parquet",
     log:
-        "logs/parametrise/parameters.log",
+        "logs/parametrise/{source}/parameters.log",
     threads: 1
     params:
         code=code("pipeline.parametrise.assemble"),
@@ -59,11 +59,11 @@ rule assemble_parameters:
 
 rule assemble_tilt_references:
     input:
-        each(rules.parametrise.output.tilt_references),
+        expand(rules.parametrise.output.tilt_references, object=OBJECTS, allow_missing=True),
     output:
-        f"{PROCESSED}/parametrise/{SOURCE}/tilt_references.parquet",
+        f"{PROCESSED}/parametrise/{{source}}/tilt_references.parquet",
     log:
-        "logs/parametrise/tilt_references.log",
+        "logs/parametrise/{source}/tilt_references.log",
     threads: 1
     params:
         code=code("pipeline.parametrise.assemble"),

@@ -3,6 +3,7 @@
 # Makes reports/roc.pdf (the paper's Fig. 3) with reports/metrics.json (every headline number), and reports/labels.pdf (Fig. 2);
 #       reports/parameters.pdf, every parameter on its object and against known values, and reports/parameters.json, volumes side by side;
 #       reports/scans/<object>.png, a page on each scan;
+#       when asked for, reports/sources.pdf and .json, every demonstration object as the source for every other;
 #       when asked for, reports/physics.pdf and reports/physics.json, the liquid against hydrostatics and against Bullet's spheres.
 # How: one module a figure; truth is compared here and nowhere else.
 
@@ -39,7 +40,9 @@ rule report:
         predictions=expand(rules.classify.output.predictions, experiment=EXPERIMENTS),
         accuracy=each(rules.accuracy.output.errors, FOUND.demonstration),
         warp=each(list(rules.warp.output)),
-        parametrise=[rules.assemble_parameters.output[0], rules.assemble_tilt_references.output[0]],
+        parametrise=expand(
+            [*rules.assemble_parameters.output, *rules.assemble_tilt_references.output], source=SOURCE
+        ),
         pouring=each(rules.simulate_pouring.output.trials),
         filling=each(rules.simulate_filling.output.trials),
     output:
@@ -147,3 +150,28 @@ rule report_physics:
     shell:
         "python -m pipeline.report.physics --measurements {input.measurements:q} --trials {input.trials:q}"
         " --other-trials {params.others} --page {output.page:q} --numbers {output.numbers:q} {params.options} > {log:q} 2>&1"
+
+
+rule report_sources:
+    input:
+        truth=expand(rules.scan.output.truth, object=FOUND.demonstration),
+        fuse=expand(rules.fuse.output, object=FOUND.demonstration),
+        warp=expand(rules.warp.output.label, source=FOUND.demonstration, object=FOUND.demonstration),
+        parametrise=expand(
+            rules.parametrise.output.parameters, source=FOUND.demonstration, object=FOUND.demonstration
+        ),
+    output:
+        page=f"{REPORTS}/sources.pdf",
+        numbers=f"{REPORTS}/sources.json",
+    log:
+        "logs/report/sources.log",
+    threads: 1
+    params:
+        processed=PROCESSED,
+        source=SOURCE,
+        objects=" ".join(FOUND.demonstration),
+        adopted=" ".join(name for name in FOUND.demonstration if annotation_of(name).startswith(PROCESSED)),
+        code=code("pipeline.report.sources"),
+    shell:
+        "python -m pipeline.report.sources --processed {params.processed:q} --source {params.source} --objects {params.objects}"
+        " --adopted {params.adopted} --page {output.page:q} --numbers {output.numbers:q} > {log:q} 2>&1"

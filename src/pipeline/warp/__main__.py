@@ -2,41 +2,64 @@
 
 from pathlib import Path
 from typing import TYPE_CHECKING
+from zlib import crc32
 
 from pipeline import command
 from pipeline.artefacts import normals, points, read_table, write_json, write_table
+from pipeline.errors import PipelineError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from pipeline.warp.warp import Cloud, Mapped, Warp
+    from pipeline.warp.clouds import Cloud, Mapped
+    from pipeline.warp.warp import Warp
 
 
 def main() -> None:
-    """Read the labels of the source and of a target; write both mappings and the alignment."""
+    """Read the labels of the source and of a target; write both mappings, the alignment and the warp itself."""
     parser = command.parser(__doc__)
-    for option in ("--source-labels", "--target-labels", "--point-mapping", "--label-mapping", "--alignment"):
+    for option in ("--source-labels", "--target-labels"):
         parser.add_argument(option, type=Path, required=True)
+    for option in ("--point-mapping", "--label-mapping", "--alignment", "--warp"):
+        parser.add_argument(option, type=Path, required=True)
+    parser.add_argument(
+        "--method", default="nearest_neighbour", help="how the source is fitted to the target"
+    )
     parser.add_argument("--k", type=int, default=1, help="neighbours a point is mapped to")
     parser.add_argument(
-        "--refinements", type=int, default=5, help="refinements of the alignment; the paper has none"
+        "--refinements", type=int, default=5, help="refinements of nearest_neighbour; the paper has none"
     )
+    parser.add_argument("--bends", type=int, default=1, help="bends of nearest_neighbour; the paper has none")
+    parser.add_argument("--seed", type=int, default=3, help="of methods that draw points")
     options = parser.parse_args()
 
-    from pipeline.warp import warp as warping
+    from pipeline.warp import files
 
-    fitted = warping.fit(_cloud(options.source_labels), _cloud(options.target_labels), options.refinements)
-    mapped = {
-        "point_mapping": warping.point_mapping(fitted, options.k),
-        "label_mapping": warping.label_mapping(fitted, options.k),
-    }
+    fitted = _fit(options)
+    mapped = {"point_mapping": fitted.map_cloud(options.k), "label_mapping": fitted.map_labels(options.k)}
     write_table(options.point_mapping, _table(mapped["point_mapping"]), "mapping")
     write_table(options.label_mapping, _table(mapped["label_mapping"]), "mapping")
     write_json(options.alignment, _alignment(fitted, mapped))
+    files.save(options.warp, fitted)
+
+
+def _fit(options) -> "Warp":  # type: ignore[no-untyped-def]
+    import numpy as np
+
+    from pipeline.warp.methods import METHODS
+
+    if options.method not in METHODS:
+        raise PipelineError(
+            f"--method: expected one of {' '.join(METHODS)}, found '{options.method}'; correct warp.method"
+        )
+    source, target = _cloud(options.source_labels), _cloud(options.target_labels)
+    own = {"nearest_neighbour": {"refinements": options.refinements, "bends": options.bends}}
+    rng = np.random.default_rng([options.seed, crc32(target.name.encode())])
+    return METHODS[options.method](source, target, rng=rng, **own.get(options.method, {}))
 
 
 def _cloud(path: Path) -> "Cloud":
-    from pipeline.warp.warp import Cloud
+    from pipeline.warp.clouds import Cloud
 
     table = read_table(path, "labels")
     parts = table[["container", "rim", "handle"]].to_numpy(bool)
@@ -61,32 +84,22 @@ def _table(mapped: "Mapped") -> "pd.DataFrame":
 
 
 def _alignment(warp: "Warp", mapped: "dict[str, Mapped]") -> dict:
-    import numpy as np
-
-    from pipeline.warp.warp import wall_side_flips
+    from pipeline.warp.quality import quality, unchecked_flips
 
     return {
+        "method": warp.method,
         "source": warp.source.name,
         "target": warp.target.name,
         "T_source_part": warp.source_frame.T_object_part.tolist(),
         "T_target_part": warp.target_frame.T_object_part.tolist(),
-        "first_axis_knots_m": warp.stretch.knots_m.tolist(),
-        "scale": [
-            float(np.ptp(warp.stretch.knots_m[1]) / np.ptp(warp.stretch.knots_m[0])),
-            *warp.stretch.scale.tolist(),
-        ],
-        "offset_m": warp.stretch.offset_m.tolist(),
+        "scale": warp.scale.tolist(),
         "roll_observable": warp.target_frame.roll_observable,
-        **{
-            mapping: {
-                "residual_m": float(np.mean(result.distance_m[result.valid])),
-                "share_without_candidate": float(np.mean(~result.valid)),
-                "wall_side_flips": wall_side_flips(warp, result),
-                "share_of_target_reached": len(np.unique(result.target_index[result.valid]))
-                / len(warp.target.points_m),
-            }
-            for mapping, result in mapped.items()
-        },
+        "roll_symmetry": warp.target_frame.roll_symmetry,
+        "handles": warp.target_frame.handles,
+        "cost_m": warp.cost_m,
+        "diagnostics": warp.diagnostics,
+        "wall_side_flips_without_check": unchecked_flips(warp),
+        **{mapping: quality(warp, result) for mapping, result in mapped.items()},
     }
 
 

@@ -1,120 +1,118 @@
-"""Warp a source object to a target: align, scale, map (section II-B and II-C)."""
+"""A warp of a source onto a target, by whatever method: what it moves, and what it maps (sections II-B and II-C)."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from pipeline.geometry import frames
-from pipeline.warp.alignment import PartFrame, part_frame, scale
+from pipeline.warp.alignment import PartFrame
+from pipeline.warp.clouds import Cloud, Mapped
+from pipeline.warp.deformation import Deformation
 from pipeline.warp.nearest import agreeing_neighbours, majority_of_neighbours, mean_of_neighbours
-from pipeline.warp.stretch import Stretch, between_extents, linear
-
-REFINEMENT_POINTS = 4000
-WALL_COSINE = (
-    0.8  # a point is on a wall, not on a lip or floor, where its normal is this near to the horizontal
-)
-
-
-@dataclass(frozen=True)
-class Cloud:
-    """An object's points (N, 3) in metres, unit normals (N, 3), area of each (N,) and parts (N, 3 bool), upright."""
-
-    name: str
-    points_m: np.ndarray
-    normals: np.ndarray
-    area_m2: np.ndarray
-    parts: np.ndarray
-
-
-@dataclass(frozen=True)
-class Mapped:
-    """A warped cloud O_w in the target's object frame, with the rows of source and target that it joins."""
-
-    cloud: Cloud
-    source_index: np.ndarray
-    target_index: np.ndarray
-    valid: np.ndarray
-    distance_m: np.ndarray
 
 
 @dataclass(frozen=True)
 class Warp:
-    """An alignment of a source with a target: part frames, and the stretch between them."""
+    """A source fitted to a target: their part frames, and the deformation that takes the one onto the other.
 
-    source_frame: PartFrame
-    target_frame: PartFrame
-    stretch: Stretch
+    `diagnostics` are numbers that the method says of itself.
+    """
+
+    method: str
     source: Cloud
     target: Cloud
+    source_frame: PartFrame
+    target_frame: PartFrame
+    deformation: Deformation
+    diagnostics: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def pose(self) -> np.ndarray:
+        """T_target_source (4, 4): the coarse alignment, part frame onto part frame."""
+        return self.target_frame.T_object_part @ frames.inverse(self.source_frame.T_object_part)
+
+    @cached_property
+    def scale(self) -> np.ndarray:
+        """Factors (3,) on the spread of the source's container along the part axes."""
+        T_part_object = frames.inverse(self.target_frame.T_object_part)
+        container_m = self.aligned.points_m[self.source.parts[:, 0]]
+        return frames.apply(T_part_object, container_m).std(axis=0) / self.source_frame.spread_m
 
     @cached_property
     def aligned(self) -> Cloud:
-        """The source, stretched, in the target's object frame."""
-        T_part_object = frames.inverse(self.source_frame.T_object_part)
-        part_m = frames.apply(T_part_object, self.source.points_m)
-        factors = self.stretch.factors(part_m)
-        # Normals follow the inverse transpose of the Jacobian, areas its cofactor.
-        stretched = frames.rotate(T_part_object, self.source.normals) / factors
-        length = np.linalg.norm(stretched, axis=1)
-        return replace(
-            self.source,
-            points_m=frames.apply(self.target_frame.T_object_part, self.stretch.map(part_m)),
-            normals=frames.rotate(self.target_frame.T_object_part, stretched / length[:, None]),
-            area_m2=self.source.area_m2 * factors.prod(axis=1) * length,
-        )
+        """The source, deformed, in the target's object frame."""
+        return self.deformation.carry(self.source)
 
+    @property
+    def source_index(self) -> np.ndarray:
+        """Rows (N,) of the source's points, each paired with one of `target_index`."""
+        return np.arange(len(self.source.points_m))
 
-def fit(source: Cloud, target: Cloud, refinements: int) -> Warp:
-    """Align the source with the target by part frames and give its container the target's variances (the paper's).
+    @cached_property
+    def _pairs(self) -> tuple[np.ndarray, np.ndarray]:
+        index, distance_m = point_pairs(self, 1)
+        return index[:, 0], distance_m[:, 0]
 
-    With refinements, which the paper does not have: along the first axis the container gets the target's extent
-    instead, because equal variances leave the lips of a mug and a bowl apart, and the rim keeps its thickness; across,
-    nearest points with agreeing normals, paired both ways, are brought together by a factor and an offset an axis.
-    """
-    source_frame = part_frame(source.points_m, source.parts, name=source.name)
-    target_frame = part_frame(target.points_m, target.parts, name=target.name)
-    stretch = linear(scale(source_frame, target_frame))
-    if refinements:
-        here, there = _extent(source, source_frame), _extent(target, target_frame)
-        rim = source.points_m[source.parts[:, 1]]
-        rim_m = here[1] - np.quantile(_in_part_frame(rim, source_frame)[:, 0], 0.02)
-        stretch = between_extents(here, there, rim_m, scale(source_frame, target_frame))
-    warp = Warp(source_frame, target_frame, stretch, source, target)
-    for _ in range(refinements):
-        warp = _refined(warp)
-    return warp
+    @property
+    def target_index(self) -> np.ndarray:
+        """Rows (N,) of the target's points that the source's go to; −1 where `valid` is not."""
+        return self._pairs[0]
 
+    @property
+    def valid(self) -> np.ndarray:
+        """Whether (N,) a source point has a target point with an agreeing normal."""
+        return self.target_index >= 0
 
-def _in_part_frame(points_m: np.ndarray, frame: PartFrame) -> np.ndarray:
-    return frames.apply(frames.inverse(frame.T_object_part), points_m)
+    @property
+    def cost_m(self) -> float:
+        """Root mean squared distance of the paired points, in metres; inf without any pair."""
+        distance_m = self._pairs[1][self.valid]
+        return float(np.sqrt(np.mean(distance_m**2))) if len(distance_m) else float("inf")
 
+    def map_points(self, points_m: np.ndarray) -> np.ndarray:
+        """Return where points (N, 3) of the source's object frame go in the target's: contact points, via-points."""
+        return self.deformation.map(points_m)
 
-def _extent(cloud: Cloud, frame: PartFrame) -> np.ndarray:
-    """Return where the container begins and ends along the first axis (2,), but for one point in a thousand."""
-    return np.quantile(_in_part_frame(cloud.points_m[cloud.parts[:, 0]], frame)[:, 0], [0.001, 0.999])
+    def map_frames(self, T_source_frame: np.ndarray) -> np.ndarray:
+        """Return task frames (N, 4, 4) of the source's object frame in the target's.
 
+        The rotation is the nearest one to the Jacobian's image of the old axes.
+        """
+        origins_m = T_source_frame[:, :3, 3]
+        axes = self.jacobian(origins_m) @ T_source_frame[:, :3, :3]
+        left, _, right = np.linalg.svd(axes)
+        left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
+        T_target_frame = np.tile(np.eye(4), (len(origins_m), 1, 1))
+        T_target_frame[:, :3, :3], T_target_frame[:, :3, 3] = left @ right, self.map_points(origins_m)
+        return T_target_frame
 
-def _refined(warp: Warp) -> Warp:
-    """Return the warp with the factors and offsets across the first axis that fit its present pairs best."""
-    some_source, some_target = (_thinned(cloud) for cloud in (warp.source, warp.target))
-    thin = replace(warp, source=some_source, target=some_target)
-    there, back = point_pairs(thin, 1)[0][:, 0], label_pairs(thin, 1)[0][:, 0]
-    # A handle has no counterpart on a target without one.
-    usable = ~some_source.parts[:, 2] | warp.target_frame.roll_observable
-    forth, home = np.flatnonzero((there >= 0) & usable), np.flatnonzero((back >= 0) & usable[back])
-    x = _in_part_frame(some_source.points_m, warp.source_frame)[:, 1:]
-    y = _in_part_frame(some_target.points_m, warp.target_frame)[:, 1:]
-    x, y = np.vstack([x[forth], x[back[home]]]), np.vstack([y[there[forth]], y[home]])
-    mean_x, mean_y = x.mean(axis=0), y.mean(axis=0)
-    factors = ((x - mean_x) * (y - mean_y)).sum(axis=0) / ((x - mean_x) ** 2).sum(axis=0)
-    return replace(warp, stretch=replace(warp.stretch, scale=factors, offset_m=mean_y - factors * mean_x))
+    def jacobian(self, points_m: np.ndarray) -> np.ndarray:
+        """Return the deformation's derivatives (N, 3, 3) at points (N, 3) of the source's object frame."""
+        return self.deformation.jacobian(points_m)
 
+    def map_cloud(self, k: int) -> Mapped:
+        """Map each source point to the mean of its k nearest target points with an agreeing normal; labels stay.
 
-def _thinned(cloud: Cloud) -> Cloud:
-    step = max(1, len(cloud.points_m) // REFINEMENT_POINTS)
-    arrays = ("points_m", "normals", "area_m2", "parts")
-    return replace(cloud, **{name: getattr(cloud, name)[::step] for name in arrays})
+        The paper's point mapping.
+        """
+        target, aligned = self.target, self.aligned
+        index, distance = point_pairs(self, k)
+        normals = mean_of_neighbours(target.normals, index)
+        normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        points_m = mean_of_neighbours(target.points_m, index)
+        cloud = Cloud(target.name, points_m, normals, aligned.area_m2, aligned.parts)
+        return Mapped(cloud, self.source_index, index[:, 0], index[:, 0] >= 0, distance[:, 0])
+
+    def map_labels(self, k: int) -> Mapped:
+        """Give each target point the labels that most of its k nearest source points with an agreeing normal have.
+
+        The paper's label mapping.
+        """
+        index, distance = label_pairs(self, k)
+        parts = majority_of_neighbours(self.aligned.parts, index)
+        cloud = replace(self.target, parts=parts)
+        return Mapped(cloud, index[:, 0], np.arange(len(parts)), index[:, 0] >= 0, distance[:, 0])
 
 
 def point_pairs(warp: Warp, k: int) -> tuple[np.ndarray, np.ndarray]:
@@ -127,37 +125,3 @@ def label_pairs(warp: Warp, k: int) -> tuple[np.ndarray, np.ndarray]:
     """Return for each target point the k nearest source points with an agreeing normal: rows (M, k), distances (M, k)."""
     aligned, target = warp.aligned, warp.target
     return agreeing_neighbours(target.points_m, target.normals, aligned.points_m, aligned.normals, k)
-
-
-def point_mapping(warp: Warp, k: int) -> Mapped:
-    """Map each source point to the mean of its k nearest target points with an agreeing normal; labels stay."""
-    target, aligned = warp.target, warp.aligned
-    index, distance = point_pairs(warp, k)
-    normals = mean_of_neighbours(target.normals, index)
-    normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-    points_m = mean_of_neighbours(target.points_m, index)
-    cloud = Cloud(target.name, points_m, normals, aligned.area_m2, aligned.parts)
-    return Mapped(cloud, np.arange(len(points_m)), index[:, 0], index[:, 0] >= 0, distance[:, 0])
-
-
-def label_mapping(warp: Warp, k: int) -> Mapped:
-    """Give each target point the labels that most of its k nearest source points with an agreeing normal have."""
-    index, distance = label_pairs(warp, k)
-    parts = majority_of_neighbours(warp.aligned.parts, index)
-    cloud = replace(warp.target, parts=parts)
-    return Mapped(cloud, index[:, 0], np.arange(len(parts)), index[:, 0] >= 0, distance[:, 0])
-
-
-def wall_side_flips(warp: Warp, mapped: Mapped) -> float:
-    """Return the share of pairs on the wall whose points face opposite ways from the axis of the container."""
-    rows = np.flatnonzero(mapped.valid)
-    here = _facing_outward(warp.aligned, warp.target_frame)[mapped.source_index[rows]]
-    there = _facing_outward(warp.target, warp.target_frame)[mapped.target_index[rows]]
-    on_wall = (np.abs(here) > WALL_COSINE) & (np.abs(there) > WALL_COSINE)
-    return float(np.mean(here[on_wall] * there[on_wall] < 0.0)) if on_wall.any() else 0.0
-
-
-def _facing_outward(cloud: Cloud, frame: PartFrame) -> np.ndarray:
-    radial = cloud.points_m[:, :2] - frame.T_object_part[:2, 3]
-    radial = radial / np.maximum(np.linalg.norm(radial, axis=1, keepdims=True), 1e-9)
-    return np.einsum("nc,nc->n", radial, cloud.normals[:, :2])

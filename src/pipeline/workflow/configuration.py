@@ -31,7 +31,7 @@ def typed(config: Any, schema: dict) -> Any:
         return {key: typed(value, properties.get(key, {})) for key, value in config.items()}
     if isinstance(config, list):
         return [typed(value, schema.get("items", {})) for value in config]
-    reader: Any = {"integer": int, "number": float, "boolean": _switch}.get(schema.get("type", ""))
+    reader: Any = {"integer": int, "number": float, "boolean": _switch}.get(str(schema.get("type")))
     if isinstance(config, str) and reader:
         try:
             return reader(config)

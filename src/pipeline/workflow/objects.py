@@ -46,6 +46,12 @@ def find(raw: str | Path, config: dict) -> Objects:
     return found
 
 
+def sources(config: dict) -> list[str]:
+    """Return the names of the sources: `objects.source` is one, or a list of them."""
+    named = config["objects"]["source"]
+    return [named] if isinstance(named, str) else list(named)
+
+
 def files(folder: str | Path) -> list[str]:
     """Return every file below `folder` in alphabetical order; hidden ones are left out, links are followed."""
     found: list[str] = []
@@ -114,7 +120,7 @@ def _check_configured(key: str, names: set[str], known: set[str]) -> None:
 
 
 def _check_roles(config: dict, found: Objects, exclude: set[str]) -> None:
-    roles = [("objects.source", config["objects"]["source"])]
+    roles = [("objects.source", name) for name in sources(config)]
     roles += [
         ("simulate.filling.held_objects", name) for name in config["simulate"]["filling"]["held_objects"]
     ]

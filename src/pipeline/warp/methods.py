@@ -1,0 +1,12 @@
+"""The methods of warping by name: `fit(source, target, *, rng, …) -> Warp`, one module each."""
+
+from collections.abc import Callable
+
+from pipeline.warp import cpd, nearest_neighbour, rigid
+from pipeline.warp.warp import Warp
+
+METHODS: dict[str, Callable[..., Warp]] = {
+    "nearest_neighbour": nearest_neighbour.fit,
+    "rigid": rigid.fit,
+    "cpd": cpd.fit,
+}
