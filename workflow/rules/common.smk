@@ -66,6 +66,12 @@ def each(pattern, names=OBJECTS):
     return expand(pattern, object=names, source=SOURCE)
 
 
+def named(option, pattern, wanted=True):
+    """Return `--option NAME=PATH …` with the path of each object when it is wanted, else nothing."""
+    words = " ".join(f"{name}={path}" for name, path in zip(OBJECTS, each(pattern)))
+    return f"--{option} {words}" if wanted else ""
+
+
 wildcard_constraints:
     object="|".join(OBJECTS),
     source=SOURCE,
