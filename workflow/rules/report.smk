@@ -2,6 +2,7 @@
 # Makes report/accuracy/<object>.json, a demonstration object's errors against its truth.
 # Makes reports/roc.pdf (the paper's Fig. 3) with reports/metrics.json (every headline number), and reports/labels.pdf (Fig. 2);
 #       reports/scans/<object>.png, a page on each scan;
+#       reports/evaluation.pdf and .json, how sure the scores are and what that says of the paper's claims;
 #       when asked for, reports/physics.pdf and reports/physics.json, the liquid against hydrostatics and against Bullet's spheres.
 # How: one module a figure; truth is compared here and nowhere else.
 
@@ -54,6 +55,31 @@ rule report:
         "python -m pipeline.report.roc --curves {input.curves:q} --scores {input.scores:q} --output {output.roc:q} > {log:q} 2>&1\n"
         "python -m pipeline.report.metrics --processed {params.processed:q} --source {params.source} --objects {params.objects}"
         " --accuracy {input.accuracy:q} --output {output.metrics:q} >> {log:q} 2>&1"
+
+
+rule report_evaluation:
+    input:
+        replicates=expand(rules.classify.output.replicates, experiment=EXPERIMENTS),
+        pairs=expand(rules.classify.output.pairs, experiment=EXPERIMENTS),
+        learning=expand(rules.classify_learning.output.learning, experiment=EXPERIMENTS),
+        scores=expand(rules.classify.output.scores, experiment=EXPERIMENTS),
+        predictions=expand(rules.classify.output.predictions, experiment=EXPERIMENTS),
+        fillings=each(rules.simulate_filling.output.trials),
+    output:
+        page=f"{REPORTS}/evaluation.pdf",
+        numbers=f"{REPORTS}/evaluation.json",
+    log:
+        "logs/report/evaluation.log",
+    benchmark:
+        "benchmarks/report/evaluation.tsv"
+    threads: 1
+    params:
+        options=options("classify", "resamples", "seed"),
+        code=code("pipeline.report.evaluation"),
+    shell:
+        "python -m pipeline.report.evaluation --replicates {input.replicates:q} --pairs {input.pairs:q} --learning {input.learning:q}"
+        " --scores {input.scores:q} --predictions {input.predictions:q} --fillings {input.fillings:q} --page {output.page:q}"
+        " --numbers {output.numbers:q} {params.options} > {log:q} 2>&1"
 
 
 TARGETS = [name for name in OBJECTS if name != SOURCE]
