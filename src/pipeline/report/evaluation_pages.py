@@ -30,6 +30,11 @@ MEASURES = {
 }
 SETS = ("label_mapping", "point_mapping", "standard", "hydrostatic")
 MARKERS = dict(zip(SETS, "os^D", strict=True))
+# Label mapping wide and first, so that it is seen below point mapping.
+LINES: Any = {
+    name: {"lw": lw, "ms": ms}
+    for name, lw, ms in zip(SETS, (2.4, 0.9, 1.0, 1.0), (4, 2.5, 3, 3), strict=True)
+}
 NOTE = (
     "Bars: 95 % percentile intervals of a bootstrap over objects, jointly as trainers and as tests. Filled: novel objects; "
     "open: other trials of the training object.\nΔ: label mapping − standard features on novel objects, paired replicate by "
@@ -50,16 +55,46 @@ def scores_page(
     with plt.rc_context(SMALL):
         figure = plt.figure(figsize=A4)
         grid = figure.add_gridspec(
-            5, len(experiments), left=0.25, right=0.96, top=0.93, bottom=0.09, hspace=0.6, wspace=0.3
+            5, len(experiments), left=0.25, right=0.89, top=0.93, bottom=0.09, hspace=0.35, wspace=0.42
         )
         for column, experiment in enumerate(experiments):
             _forest(figure.add_subplot(grid[:3, column]), numbers, experiment, labelled=column == 0)
             _reliability(figure.add_subplot(grid[3:, column]), calibrations, numbers, experiment)
+        legend(figure)
         figure.suptitle(
             "How well pouring and filling are predicted, and how surely", x=0.5, y=0.975, fontsize=10
         )
-        figure.text(0.06, 0.02, NOTE, fontsize=6.5, va="bottom")
+        figure.text(0.06, 0.015, NOTE + _delong_note(numbers, experiments), fontsize=6.5, va="bottom")
     return figure
+
+
+def _delong_note(numbers: Mapping[str, float], experiments: list[str]) -> str:
+    """Return how much narrower DeLong's interval of one classifier's area is than that over tested objects."""
+    ratios = []
+    for experiment in experiments:
+        head = f"evaluation.{experiment}.label_mapping.novel.auc_half_width"
+        if f"{head}.ratio" in numbers:
+            delong, objects = (numbers[f"{head}.{by}"] for by in ("delong", "over_objects"))
+            ratios.append(f"{experiment} ±{delong:.4f} instead of ±{objects:.4f}")
+    if not ratios:
+        return ""
+    return (
+        "\nDeLong's interval of one classifier's area on novel objects takes trials as independent and is too narrow\n"
+        f"(label mapping): {', '.join(ratios)}."
+    )
+
+
+def legend(figure: "Figure", sets: tuple[str, ...] = SETS) -> None:
+    """Write one row below the title that tells colours and markers of feature sets."""
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D([], [], marker=MARKERS[name], color=COLOURS[name], ms=4, lw=1, label=WORDS[name])
+        for name in sets
+    ]
+    figure.legend(
+        handles=handles, frameon=False, loc="upper center", ncol=len(sets), bbox_to_anchor=(0.5, 0.967)
+    )
 
 
 def _forest(axis: "Axes", numbers: Mapping[str, float], experiment: str, *, labelled: bool) -> None:
@@ -78,12 +113,6 @@ def _forest(axis: "Axes", numbers: Mapping[str, float], experiment: str, *, labe
     axis.grid(axis="x", lw=0.3, color="#DDDDDD")
     for row in range(1, len(MEASURES)):
         axis.axhline(row - 0.5, lw=0.3, color="#BBBBBB")
-    if labelled:
-        handles = [
-            axis.plot([], [], MARKERS[features], ms=3.5, color=COLOURS[features], label=WORDS[features])[0]
-            for features in SETS
-        ]
-        axis.legend(handles=handles, frameon=False, loc="lower left", bbox_to_anchor=(-0.75, 1.0), ncol=1)
 
 
 def _bar(
@@ -117,7 +146,7 @@ def _reliability(
         x, y, colour = curve["predicted"][0], curve["observed"][0], COLOURS[features]
         axis.fill_between(x, low, high, color=colour, alpha=0.12, lw=0)
         label, style = f"{WORDS[features]} (mean gap {error:.3f})", MARKERS[features] + "-"
-        axis.plot(x, y, style, ms=3, lw=1, color=colour, label=label)
+        axis.plot(x, y, style, **LINES[features], color=colour, label=label)
     axis.set(
         xlim=(0, 1),
         ylim=(0, 1),
@@ -125,7 +154,7 @@ def _reliability(
         title=f"{experiment.capitalize()}: reliability, novel objects",
     )
     axis.set(xlabel="predicted probability", ylabel="share of trials with that outcome")
-    axis.legend(frameon=False, loc="upper left")
+    axis.legend(frameon=False, loc="best")
 
 
 def matrices_page(pairs: "pd.DataFrame", experiments: list[str]) -> "Figure":
@@ -135,7 +164,7 @@ def matrices_page(pairs: "pd.DataFrame", experiments: list[str]) -> "Figure":
     names = list(dict.fromkeys(pairs["training_object"]))
     with plt.rc_context(SMALL):
         figure, axes = plt.subplots(3, len(experiments), figsize=A4, squeeze=False)
-        figure.subplots_adjust(left=0.13, right=0.99, top=0.93, bottom=0.09, hspace=0.35, wspace=0.3)
+        figure.subplots_adjust(left=0.13, right=0.99, top=0.93, bottom=0.09, hspace=0.55, wspace=0.3)
         for column, experiment in enumerate(experiments):
             of_experiment = pairs[pairs["experiment"] == experiment]
             for row, features in enumerate(SETS[:3]):
@@ -154,7 +183,7 @@ def _matrix(axis: "Axes", pairs: "pd.DataFrame", features: str, names: list[str]
         for which in (features, "hydrostatic")
     )
     values = np.vstack([learnt.reindex(index=names, columns=names), ceiling.mean().reindex(names)])
-    axis.imshow(values, vmin=0.5, vmax=1.0, cmap="cividis", aspect="auto")
+    axis.imshow(values, vmin=0.7, vmax=1.0, cmap="cividis", aspect="auto")
     for (row, column), value in np.ndenumerate(values):
         if np.isfinite(value):
             text = f"{value:.2f}".lstrip("0")
@@ -165,7 +194,7 @@ def _matrix(axis: "Axes", pairs: "pd.DataFrame", features: str, names: list[str]
                 ha="center",
                 va="center",
                 fontsize=5,
-                color="white" if value < 0.75 else "black",
+                color="white" if value < 0.85 else "black",
             )
     words = [name.replace("_", " ") for name in names]
     axis.set_xticks(range(len(names)), words, rotation=90, fontsize=5.5)

@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline.report.evaluation_pages import A4, MARKERS, MEASURES, SETS, SMALL
-from pipeline.report.style import COLOURS, WORDS
+from pipeline.report.evaluation_pages import A4, LINES, MARKERS, MEASURES, SETS, SMALL, legend
+from pipeline.report.style import COLOURS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,15 +29,9 @@ def learning_page(learning: "pd.DataFrame", experiments: list[str], ceilings: di
                     f"{experiment.capitalize()}, {'novel objects' if split == 'novel' else 'training object'}"
                 )
                 if measure == "auc" and split == "novel" and experiment in ceilings:
-                    axis.axhline(
-                        ceilings[experiment],
-                        color=COLOURS["hydrostatic"],
-                        lw=1,
-                        ls=":",
-                        label=WORDS["hydrostatic"],
-                    )
-            axes[0, column].legend(frameon=False, loc="lower right")
-            _separable(axes[-1, column], rows)
+                    axis.axhline(ceilings[experiment], color=COLOURS["hydrostatic"], lw=1, ls=":")
+                _separable(axes[-1, column], rows)
+        legend(figure)
         figure.suptitle("Learning curves", y=0.975, fontsize=10)
     return figure
 
@@ -57,10 +51,8 @@ def _learning(axis: "Axes", rows: "pd.DataFrame", measure: str) -> None:
                 samples,
                 value,
                 MARKERS[features] + "-",
-                ms=3,
-                lw=1,
+                **LINES[features],
                 color=COLOURS[features],
-                label=WORDS[features],
             )
     axis.set(xscale="log", xlabel="training trials", ylabel=MEASURES[measure])
     _sample_ticks(axis, rows)
@@ -69,7 +61,7 @@ def _learning(axis: "Axes", rows: "pd.DataFrame", measure: str) -> None:
 def _separable(axis: "Axes", rows: "pd.DataFrame") -> None:
     for features in SETS[:3]:
         share = rows[rows["features"] == features].groupby("samples")["separable_share"].first()
-        axis.plot(share.index, share, MARKERS[features] + "-", ms=3, lw=1, color=COLOURS[features])
+        axis.plot(share.index, share, MARKERS[features] + "-", **LINES[features], color=COLOURS[features])
     axis.set(xscale="log", xlabel="training trials", ylabel="share of sets", ylim=(-0.02, 1.02))
     axis.set_title("Training sets that a plane separates")
     _sample_ticks(axis, rows)
