@@ -16,6 +16,7 @@ rule all:
         "reports/roc.pdf",
         "reports/metrics.json",
         "reports/labels.pdf",
+        "reports/evaluation.pdf",
         each("reports/scans/{object}.png"),
 
 
@@ -26,6 +27,7 @@ include: "workflow/rules/warp.smk"
 include: "workflow/rules/parametrise.smk"
 include: "workflow/rules/simulate.smk"
 include: "workflow/rules/classify.smk"
+include: "workflow/rules/ablate.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/track.smk"
 

@@ -52,9 +52,9 @@ def code(*entries):
         sys.exit(f"error: {error}")
 
 
-def options(section, *keys):
+def options(section, *keys, of=config):
     """Return `--key value …` for the keys of a section: one text, as Snakemake compares the values of params, not their names."""
-    values = config
+    values = of
     for name in section.split("."):
         values = values[name]
     words = {key: values[key] if isinstance(values[key], list) else [values[key]] for key in keys}

@@ -3,6 +3,7 @@
 # Makes reports/roc.pdf (the paper's Fig. 3) with reports/metrics.json (every headline number), and reports/labels.pdf (Fig. 2);
 #       reports/scans/<object>.png, a page on each scan;
 #       reports/evaluation.pdf and .json, how sure the scores are and what that says of the paper's claims;
+#       when asked for, reports/ablations.pdf and .json, the scores with one key changed at a time;
 #       when asked for, reports/physics.pdf and reports/physics.json, the liquid against hydrostatics and against Bullet's spheres.
 # How: one module a figure; truth is compared here and nowhere else.
 
@@ -80,6 +81,33 @@ rule report_evaluation:
         "python -m pipeline.report.evaluation --replicates {input.replicates:q} --pairs {input.pairs:q} --learning {input.learning:q}"
         " --scores {input.scores:q} --predictions {input.predictions:q} --fillings {input.fillings:q} --page {output.page:q}"
         " --numbers {output.numbers:q} {params.options} > {log:q} 2>&1"
+
+
+rule report_ablations:
+    input:
+        replicates=[
+            path.format(variant=variant, experiment=experiment)
+            for path in [rules.ablate.output.replicates]
+            for variant, experiment in ABLATED
+        ],
+        scores=[
+            path.format(variant=variant, experiment=experiment)
+            for path in [rules.ablate.output.scores]
+            for variant, experiment in ABLATED
+        ],
+    output:
+        page=f"{REPORTS}/ablations.pdf",
+        numbers=f"{REPORTS}/ablations.json",
+    log:
+        "logs/report/ablations.log",
+    threads: 1
+    params:
+        variants=" ".join(f"{variant}={key}:{value}" for variant, (key, value) in VARIANTS.items()),
+        trials=options("ablate", "trials", "draws"),
+        code=code("pipeline.report.ablations"),
+    shell:
+        "python -m pipeline.report.ablations --replicates {input.replicates:q} --scores {input.scores:q} --variants {params.variants}"
+        " {params.trials} --page {output.page:q} --numbers {output.numbers:q} > {log:q} 2>&1"
 
 
 TARGETS = [name for name in OBJECTS if name != SOURCE]

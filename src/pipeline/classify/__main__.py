@@ -10,9 +10,10 @@ from pipeline.classify import inputs
 def main() -> None:
     """Read all objects' trials and warped parameters; write how well classifiers do, and the classifiers themselves."""
     parser = inputs.parser(__doc__)
-    parser.add_argument("--predictions", type=Path, help="of each tested trial; left out when not named")
-    for option in ("--scores", "--curves", "--models", "--replicates", "--pairs"):
+    for option in ("--scores", "--replicates"):
         parser.add_argument(option, type=Path, required=True)
+    for option in ("--predictions", "--curves", "--models", "--pairs"):
+        parser.add_argument(option, type=Path, help="left out when not named")
     options = parser.parse_args()
 
     import pandas as pd
@@ -27,14 +28,17 @@ def main() -> None:
     results = Results(resampled, keep_predictions=options.predictions is not None)
     evaluate(given.trials, given.labels, given.feature_sets, protocol, results)
     ceiling(given.trials, given.labels, results)
+    head = {"experiment": options.experiment, "samples": protocol.samples}
+    write_table(options.scores, pd.DataFrame(results.scores), "scores")
+    write_table(options.replicates, resampled.table("features", "split").assign(**head), "replicates")
     if options.predictions:
         write_table(options.predictions, pd.concat(results.predictions, ignore_index=True), "predictions")
-    write_table(options.scores, pd.DataFrame(results.scores), "scores")
-    write_table(options.curves, pd.concat(results.curves, ignore_index=True), "curves")
-    write_models(options.models, results.models)
-    head = {"experiment": options.experiment, "samples": protocol.samples}
-    write_table(options.replicates, resampled.table("features", "split").assign(**head), "replicates")
-    write_table(options.pairs, resampled.pairs("features", "split").assign(**head), "pairs")
+    if options.curves:
+        write_table(options.curves, pd.concat(results.curves, ignore_index=True), "curves")
+    if options.models:
+        write_models(options.models, results.models)
+    if options.pairs:
+        write_table(options.pairs, resampled.pairs("features", "split").assign(**head), "pairs")
 
 
 if __name__ == "__main__":

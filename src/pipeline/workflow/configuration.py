@@ -123,6 +123,7 @@ def _check_pairs(config: dict) -> None:
         )
         most = max(config["classify"]["learning_samples"])
         _below("classify.learning_samples", most, f"simulate.{name}.trials", section["trials"])
+    _below("classify.samples", config["classify"]["samples"], "ablate.trials", config["ablate"]["trials"])
     if simulate["device"] == "cuda" and simulate["engine"] != "liquid":
         raise PipelineError(
             f"simulate.device: expected cpu with simulate.engine {simulate['engine']}, found cuda, which computes the "
