@@ -104,9 +104,7 @@ def _forest(axis: "Axes", numbers: Mapping[str, float], experiment: str, *, labe
                 name = f"evaluation.{experiment}.{features}.{split}.{measure}"
                 if name in numbers:
                     y = row + 0.18 * (place - 1.5) + (0.0 if split == "novel" else -0.07)
-                    _bar(
-                        axis, numbers, name, y, COLOURS[features], MARKERS[features], filled=split == "novel"
-                    )
+                    bar(axis, numbers, name, y, COLOURS[features], MARKERS[features], filled=split == "novel")
         axis.text(1.02, row, _difference(numbers, experiment, measure), fontsize=5.5, va="center", ha="left")
     axis.set(xlim=(-0.02, 1.02), ylim=(len(MEASURES) - 0.5, -0.5), title=experiment.capitalize())
     axis.set_yticks(range(len(MEASURES)), list(MEASURES.values()) if labelled else [])
@@ -115,9 +113,10 @@ def _forest(axis: "Axes", numbers: Mapping[str, float], experiment: str, *, labe
         axis.axhline(row - 0.5, lw=0.3, color="#BBBBBB")
 
 
-def _bar(
+def bar(
     axis: "Axes", numbers: Mapping[str, float], name: str, y: float, colour: str, marker: str, *, filled: bool
 ) -> None:
+    """Draw the number `name` at height `y` with its interval; open markers are paler."""
     ends = [numbers.get(f"{name}.{end}", numbers[name]) for end in ("low", "high")]
     axis.plot(ends, [y, y], lw=0.9, color=colour, alpha=1.0 if filled else 0.55)
     axis.plot(numbers[name], y, marker, ms=3.2, mew=0.7, color=colour, mfc=colour if filled else "white")
@@ -154,7 +153,8 @@ def _reliability(
         title=f"{experiment.capitalize()}: reliability, novel objects",
     )
     axis.set(xlabel="predicted probability", ylabel="share of trials with that outcome")
-    axis.legend(frameon=False, loc="best")
+    if axis.get_legend_handles_labels()[0]:
+        axis.legend(frameon=False, loc="best")
 
 
 def matrices_page(pairs: "pd.DataFrame", experiments: list[str]) -> "Figure":
