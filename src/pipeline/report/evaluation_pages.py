@@ -79,8 +79,8 @@ def _delong_note(numbers: Mapping[str, float], experiments: list[str]) -> str:
     if not ratios:
         return ""
     return (
-        "\nDeLong's interval of one classifier's area on novel objects takes trials as independent and is too narrow\n"
-        f"(label mapping): {', '.join(ratios)}."
+        "\nDeLong's interval of one classifier's area on novel objects (label mapping) takes trials as independent, too narrowly:\n"
+        f"{', '.join(ratios)}."
     )
 
 
@@ -154,7 +154,7 @@ def _reliability(
     )
     axis.set(xlabel="predicted probability", ylabel="share of trials with that outcome")
     if axis.get_legend_handles_labels()[0]:
-        axis.legend(frameon=False, loc="best")
+        axis.legend(frameon=False, loc="lower right")
 
 
 def matrices_page(pairs: "pd.DataFrame", experiments: list[str]) -> "Figure":
@@ -194,7 +194,7 @@ def _matrix(axis: "Axes", pairs: "pd.DataFrame", features: str, names: list[str]
                 ha="center",
                 va="center",
                 fontsize=5,
-                color="white" if value < 0.85 else "black",
+                color="white" if value < 0.88 else "black",
             )
     words = [name.replace("_", " ") for name in names]
     axis.set_xticks(range(len(names)), words, rotation=90, fontsize=5.5)

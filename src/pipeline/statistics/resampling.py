@@ -76,7 +76,7 @@ class Resampled:
         by_key: dict[tuple, list[tuple[np.ndarray, np.ndarray]]] = defaultdict(list)
         for (*key_parts, trainer), draws in self._values.items():
             weight = self.weights[:, [self.names.index(trainer)]]
-            by_key[tuple(key_parts)].append((weight, np.mean(draws, axis=0)))
+            by_key[tuple(key_parts)].append((weight, _mean(draws)))
         frames = []
         for key, trainers in by_key.items():
             head = dict(zip(key_names, key, strict=True))
@@ -89,11 +89,18 @@ class Resampled:
         rows = [
             {
                 **dict(zip((*key_names, "training_object", "test_object"), key, strict=True)),
-                **dict(zip(COLUMNS, np.mean(draws, axis=0), strict=True)),
+                **dict(zip(COLUMNS, _mean(draws), strict=True)),
             }
             for key, draws in self._pairs.items()
         ]
         return pd.DataFrame(rows)
+
+
+def _mean(draws: list[np.ndarray]) -> np.ndarray:
+    """Return the mean over draws; one whose test had one outcome only is left out."""
+    values = np.array(draws)
+    count = np.isfinite(values).sum(axis=0)
+    return np.divide(np.nansum(values, axis=0), count, out=np.full(values.shape[1:], np.nan), where=count > 0)
 
 
 def _weighted_mean(trainers: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
