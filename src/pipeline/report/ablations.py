@@ -140,8 +140,8 @@ def _note(trials: int, draws: int) -> str:
         "Filled: novel objects; open: other trials of the training object. Bars: 95 % intervals of a bootstrap over objects, "
         "jointly as trainers and as tests.\nRight: area of label mapping on novel objects less the default's (dotted), on the same "
         f"replicates, its interval and p value. {draws} training sets an object.\nTrials are the default's own, except for keys of "
-        f"simulate: {trials} new ones an object. Other sources than the annotated object take the labels that it was warped onto "
-        "them with."
+        f"simulate: {trials} new ones an object. Other sources than\nthe annotated object take the labels that "
+        "were mapped onto them from it."
     )
 
 

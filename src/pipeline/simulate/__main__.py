@@ -53,7 +53,7 @@ def _options() -> argparse.Namespace:
             "--ranges",
             default="relative",
             choices=("relative", "absolute"),
-            help="to the objects, or to a cup",
+            help="to the objects, or absolute",
         )
         experiment.add_argument("--seed", type=int, default=4, help="of the whole experiment")
         experiment.add_argument("--trials", type=int, default=1000, help="number of trials")

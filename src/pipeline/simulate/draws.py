@@ -12,8 +12,9 @@ import numpy as np
 from pipeline.geometry import frames
 from pipeline.geometry.cavity import Cavity, lip_alone, lip_towards, pour_axis
 
-# With absolute ranges shares are of this cup instead of the objects at hand; fills end where the object is full.
-CUP_M3, CUP_RADIUS_M, CUP_HEIGHT_M = 2.5e-4, 0.040, 0.090
+# With absolute ranges shares are of these instead of the objects at hand; fills end where the object is full. The height is
+# enough for a tall cup to hang above a wide bowl.
+CUP_M3, CUP_RADIUS_M, CUP_HEIGHT_M = 2.5e-4, 0.060, 0.150
 
 
 @dataclass(frozen=True)
