@@ -79,7 +79,7 @@ def _delong_note(numbers: Mapping[str, float], experiments: list[str]) -> str:
     if not ratios:
         return ""
     return (
-        "\nDeLong's interval of one classifier's area on novel objects (label mapping) takes trials as independent, too narrowly:\n"
+        "\nDeLong's interval of a classifier's area on novel objects (label mapping), trials taken as independent, is too narrow:\n"
         f"{', '.join(ratios)}."
     )
 
@@ -154,7 +154,7 @@ def _reliability(
     )
     axis.set(xlabel="predicted probability", ylabel="share of trials with that outcome")
     if axis.get_legend_handles_labels()[0]:
-        axis.legend(frameon=False, loc="lower right")
+        axis.legend(frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.17))
 
 
 def matrices_page(pairs: "pd.DataFrame", experiments: list[str]) -> "Figure":
