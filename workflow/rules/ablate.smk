@@ -92,9 +92,10 @@ rule adopt_labels:
 
 def labels_of_source(wildcards):
     """Return the labels of the variant's source."""
-    source = varied(wildcards.variant)["objects"]["source"]
-    pattern = rules.label.output.labels if source == SOURCE else rules.adopt_labels.output.labels
-    return pattern.format(object=source)
+    key, value = VARIANTS[wildcards.variant]
+    if key == "objects.source":
+        return rules.adopt_labels.output.labels.format(object=value)
+    return rules.label.output.labels.format(object=SOURCE)
 
 
 use rule warp as ablate_warp with:
@@ -179,9 +180,13 @@ rule ablate:
         trials=of_variant(
             "simulate", "simulate/{experiment}/{object}/trials.parquet", rules.classify.input.trials
         ),
-        parameters=of_variant("warp", "parametrise/{object}.parquet", rules.assemble_parameters.output),
+        parameters=of_variant(
+            "warp", "parametrise/{object}.parquet", expand(rules.assemble_parameters.output, source=SOURCE)
+        ),
         tilt_references=of_variant(
-            "warp", "parametrise/tilt_references/{object}.parquet", rules.assemble_tilt_references.output
+            "warp",
+            "parametrise/tilt_references/{object}.parquet",
+            expand(rules.assemble_tilt_references.output, source=SOURCE),
         ),
         meshes=lambda w: (
             each(rules.fuse.output.mesh) if varied(w.variant)["classify"]["volume"] == "cavity" else []

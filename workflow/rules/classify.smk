@@ -10,8 +10,8 @@ CLASSIFY = ["penalty", "ridge", "terms", "volume", "margin", "training_objects",
 rule classify:
     input:
         trials=each(f"{PROCESSED}/simulate/{{{{experiment}}}}/{{object}}/trials.parquet"),
-        parameters=rules.assemble_parameters.output[0],
-        tilt_references=rules.assemble_tilt_references.output[0],
+        parameters=expand(rules.assemble_parameters.output, source=SOURCE)[0],
+        tilt_references=expand(rules.assemble_tilt_references.output, source=SOURCE)[0],
         meshes=each(rules.fuse.output.mesh) if config["classify"]["volume"] == "cavity" else [],
         clouds=(
             each([rules.warp.output.point, rules.warp.output.label])
@@ -47,8 +47,8 @@ rule classify:
 rule classify_learning:
     input:
         trials=rules.classify.input.trials,
-        parameters=rules.assemble_parameters.output[0],
-        tilt_references=rules.assemble_tilt_references.output[0],
+        parameters=expand(rules.assemble_parameters.output, source=SOURCE)[0],
+        tilt_references=expand(rules.assemble_tilt_references.output, source=SOURCE)[0],
         meshes=rules.classify.input.meshes,
         clouds=rules.classify.input.clouds,
     output:
