@@ -134,7 +134,7 @@ def test_the_pages_on_physics_are_made_when_they_are_asked_for(project):
 
 def test_ablations_are_made_when_they_are_asked_for_and_reuse_what_their_key_does_not_move(project):
     planned = project.planned("reports/ablations.pdf")
-    assert {"report_ablations", "adopt_labels wide_bowl"} <= planned
+    assert {"report_ablations", "ablate_labels wide_bowl"} <= planned
     assert not {job for job in planned if job.split()[0].startswith(("fuse", "label", "simulate", "warp"))}
     told = project.call("-n", "-p", "reports/ablations.pdf").stdout
     commands = [line for line in told.splitlines() if "python -m pipeline." in line]

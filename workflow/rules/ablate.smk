@@ -74,7 +74,7 @@ wildcard_constraints:
     variant="|".join(VARIANTS),
 
 
-rule adopt_labels:
+rule ablate_labels:
     input:
         estimate=rules.label.output.labels,
         mapping=each(rules.warp.output.label, ["{object}"]),
@@ -94,7 +94,7 @@ def labels_of_source(wildcards):
     """Return the labels of the variant's source."""
     key, value = VARIANTS[wildcards.variant]
     if key == "objects.source":
-        return rules.adopt_labels.output.labels.format(object=value)
+        return rules.ablate_labels.output.labels.format(object=value)
     return rules.label.output.labels.format(object=SOURCE)
 
 
