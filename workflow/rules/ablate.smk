@@ -7,7 +7,9 @@
 import copy
 
 ABLATE = f"{PROCESSED}/ablate"
+# Not the rigid method: a mug that keeps its size puts no rim on a wide bowl, which then has no parameters.
 METHODS = schema["properties"]["warp"]["properties"].get("method", {}).get("enum", [])
+METHODS = [method for method in METHODS if method != "rigid"]
 # Variant: the key that it changes and its value there.
 VARIANTS = {
     "default": ("", None),
