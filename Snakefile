@@ -17,6 +17,7 @@ rule all:
         "reports/metrics.json",
         "reports/labels.pdf",
         "reports/parameters.pdf",
+        "reports/evaluation.pdf",
         each("reports/scans/{object}.png"),
         expand(f"{PROCESSED}/parametrise/{{source}}/parameters.parquet", source=FURTHER_SOURCES),
 
@@ -28,6 +29,7 @@ include: "workflow/rules/warp.smk"
 include: "workflow/rules/parametrise.smk"
 include: "workflow/rules/simulate.smk"
 include: "workflow/rules/classify.smk"
+include: "workflow/rules/ablate.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/track.smk"
 

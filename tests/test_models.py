@@ -1,24 +1,31 @@
 import numpy as np
 import pytest
 
+from pipeline.classify.protocol import Protocol, TrainingSet
 from pipeline.classify.regression import classifier
 from pipeline.classify.trained import trained
 from pipeline.errors import PipelineError
 from pipeline.models import chosen, expanded, mean_probability, read_models, write_models
 
 
-def fitted(seed: int = 0, features: str = "label_mapping"):
+def fitted(seed: int = 0, features: str = "label_mapping", **protocol: str):
     """Return a fitted scikit-learn classifier of pouring, its model and the features it saw."""
     rng = np.random.default_rng(seed)
     x = rng.uniform([0.0, 0.05], [2.0, 0.8], (80, 2))
     y = x[:, 0] + x[:, 1] + rng.normal(0, 0.2, 80) > 1.3
-    pipeline = classifier(1.0).fit(x, y)
-    head = {"experiment": "pouring", "features": features, "training_object": "cup", "draw": seed}
-    return pipeline, trained(pipeline, head, 1.0, len(x), {"converged": True, "separable": False}), x
+    pipeline = classifier(1.0, **protocol).fit(x, y)
+    drawn = TrainingSet(("cup",), seed, np.arange(80), 0, np.ones(80, dtype=bool))
+    training = {"converged": True, "separable": False}
+    return (
+        pipeline,
+        trained(pipeline, "pouring", features, drawn, Protocol(80, 1, 0, **protocol), training),
+        x,
+    )
 
 
-def test_a_model_that_was_written_predicts_what_the_fitted_one_did(tmp_path):
-    pipeline, model, x = fitted()
+@pytest.mark.parametrize("protocol", [{}, {"penalty": "firth"}, {"terms": "quadratic"}])
+def test_a_model_that_was_written_predicts_what_the_fitted_one_did(tmp_path, protocol):
+    pipeline, model, x = fitted(**protocol)
     write_models(tmp_path / "models.json", [model])
     (read,) = read_models(tmp_path / "models.json")
     assert read == model

@@ -23,8 +23,13 @@ QUANTITIES = {
     "height": ("dz_m", "held.height_m"),
     "along": ("abs_dx_m", "second.radius_m"),
     "across": ("abs_dy_m", "second.radius_m"),
+    # Optional (classify.margin): the fill less what is left below the lip in the tilted hull, brimful before.
+    "margin": ("fill_minus_kept_m3", "held.volume_m3"),
 }
-EXPERIMENT_FEATURES = {"pouring": ("tilt", "fill"), "filling": tuple(QUANTITIES)}
+EXPERIMENT_FEATURES = {
+    "pouring": ("tilt", "fill"),
+    "filling": ("tilt", "fill", "second_fill", "height", "along", "across"),
+}
 TERMS = ("linear", "quadratic")
 
 

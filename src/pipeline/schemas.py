@@ -21,6 +21,7 @@ def _strings(*names: str) -> list[tuple[str, pa.DataType]]:
 
 
 _CURVE = _strings("experiment", "features", "split", "training_object") + _integers("draw")
+_MEASURES = ("auc", "partial_auc", "tpr_at_fpr_00", "tpr_at_fpr_01", "tpr_at_fpr_05", "brier")
 
 TABLES = {
     # Points that a human labelled, in the frame of the scan (world).
@@ -96,6 +97,23 @@ TABLES = {
         + _floats("auc", "tpr_at_fpr_00", "tpr_at_fpr_01", "tpr_at_fpr_05", "brier")
         + _integers("n_test", "n_positive", "n_iterations", "n_redrawn")
         + [("separable", pa.bool_()), ("converged", pa.bool_())]
+    ),
+    # Bootstrap over objects: a row a mean over classifiers; replicate 0 has each object once (statistics.resampling).
+    "replicates": pa.schema(
+        _strings("experiment", "features", "split") + _integers("samples", "replicate") + _floats(*_MEASURES)
+    ),
+    # The same for several numbers of samples, and how the fits of that many went.
+    "learning": pa.schema(
+        _strings("experiment", "features", "split")
+        + _integers("samples", "replicate")
+        + _floats(*_MEASURES, "separable_share", "converged_share")
+        + _integers("n_redrawn")
+    ),
+    # Classifiers of one object tested on one object, means over draws.
+    "pairs": pa.schema(
+        _strings("experiment", "features", "split", "training_object", "test_object")
+        + _integers("samples")
+        + _floats(*_MEASURES)
     ),
     # ROC curves at fixed false positive rates.
     "curves": pa.schema(_CURVE + _floats("fpr", "tpr")),

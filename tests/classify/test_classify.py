@@ -3,10 +3,18 @@ import pandas as pd
 import pytest
 
 from pipeline.classify.features import Parameters, features
-from pipeline.classify.protocol import Results, ceiling, draw_training_set, evaluate
+from pipeline.classify.protocol import (
+    Protocol,
+    Results,
+    ceiling,
+    draw_training_set,
+    evaluate,
+    training_sets,
+)
 from pipeline.classify.regression import FPR_GRID, classifier, iterations, score, separable
 from pipeline.errors import PipelineError
 from pipeline.geometry import frames
+from pipeline.statistics.resampling import Resampled, object_weights
 
 
 def trials(n: int = 200, objects: tuple[str, ...] = ("cup", "bowl"), seed: int = 0) -> pd.DataFrame:
@@ -40,6 +48,18 @@ def parameters(objects: tuple[str, ...] = ("cup", "bowl")) -> Parameters:
             }
         )
     return Parameters(pd.DataFrame(rows).T, rims)
+
+
+def nothing_yet(table: pd.DataFrame) -> Results:
+    names = list(pd.unique(table["object"]))
+    return Results(Resampled(names, object_weights(len(names), 10, 0)))
+
+
+def evaluated(table: pd.DataFrame, sets: dict[str, np.ndarray], draws: int = 1, **protocol) -> Results:
+    """Return the results of training sets of 50."""
+    results = nothing_yet(table)
+    evaluate(table, table["poured"].to_numpy(), sets, Protocol(50, draws, 1, **protocol), results)
+    return results
 
 
 def test_pouring_features_are_divided_by_the_references_at_the_lip():
@@ -83,7 +103,7 @@ def test_rescaled_features_give_the_same_scores_on_the_training_object():
     table = trials()
     sets = {"standard": features(table, parameters(), standard=True)}
     sets["label_mapping"] = features(table, parameters(), standard=False)
-    results = evaluate(table, "poured", sets, samples=50, draws=3, ridge=1.0, seed=1)
+    results = evaluated(table, sets, draws=3)
     scores = pd.DataFrame(results.scores)
     same = scores[scores["split"] == "same"].pivot(
         index=["training_object", "draw"], columns="features", values="auc"
@@ -95,15 +115,7 @@ def test_rescaled_features_give_the_same_scores_on_the_training_object():
 
 def test_splits_leave_out_the_training_samples_and_hold_all_others():
     table = trials()
-    results = evaluate(
-        table,
-        "poured",
-        {"standard": features(table, parameters(), standard=True)},
-        samples=50,
-        draws=1,
-        ridge=1.0,
-        seed=1,
-    )
+    results = evaluated(table, {"standard": features(table, parameters(), standard=True)})
     for tested in results.predictions:
         split, training = tested["split"].iloc[0], tested["training_object"].iloc[0]
         own = tested["test_object"] == training
@@ -115,16 +127,7 @@ def test_draws_of_an_object_do_not_depend_on_the_others():
     table = trials()
     alone = table[table["object"] == "cup"].reset_index(drop=True)
     both, one = (
-        evaluate(
-            t,
-            "poured",
-            {"standard": features(t, parameters(), standard=True)},
-            samples=50,
-            draws=2,
-            ridge=1.0,
-            seed=1,
-        )
-        for t in (table, alone)
+        evaluated(t, {"standard": features(t, parameters(), standard=True)}, draws=2) for t in (table, alone)
     )
     same = [score for score in both.scores if score["training_object"] == "cup" and score["split"] == "same"]
     assert same == one.scores
@@ -171,8 +174,45 @@ def test_roc_is_read_at_fixed_rates_without_interpolating():
 
 
 def test_the_ceiling_scores_the_margin_itself():
-    results = Results()
-    ceiling(trials(), "poured", results)
+    results = nothing_yet(trials())
+    ceiling(trials(), trials()["poured"].to_numpy(), results)
     assert {score["split"] for score in results.scores} == {"same", "novel"}
     assert min(score["auc"] for score in results.scores) > 0.98
     assert all(np.isnan(score["brier"]) for score in results.scores)
+
+
+def test_replicate_zero_is_the_mean_of_the_scores():
+    table = trials(objects=("cup", "bowl", "mug"))
+    results = evaluated(
+        table, {"standard": features(table, parameters(("cup", "bowl", "mug")), standard=True)}, 3
+    )
+    scores = pd.DataFrame(results.scores).groupby("split")[["auc", "brier", "tpr_at_fpr_01"]].mean()
+    replicates = results.resampled.table("features", "split")
+    first = replicates[replicates["replicate"] == 0].set_index("split")
+    np.testing.assert_allclose(first.loc[scores.index, scores.columns], scores, atol=1e-12)
+
+
+def sets_of(**protocol) -> tuple[pd.DataFrame, list]:
+    table = trials(objects=("cup", "bowl", "mug"))
+    table["held_object"] = np.tile(["cup", "mug", "jug", "can"], len(table) // 4)
+    return table, list(training_sets(table, table["poured"].to_numpy(), Protocol(50, 2, 1, **protocol)))
+
+
+def test_disjoint_held_cups_are_in_training_or_in_tests():
+    table, sets = sets_of(held_cups="disjoint")
+    held = table["held_object"].to_numpy()
+    for drawn in sets:
+        assert set(held[drawn.rows]) & set(held[drawn.testable]) == set()
+        assert len(set(held[drawn.testable])) == 2
+    table, sets = sets_of()
+    assert all(drawn.testable.all() for drawn in sets)
+
+
+def test_more_training_objects_share_the_samples_and_are_not_novel():
+    table, sets = sets_of(training_objects=2)
+    objects = table["object"].to_numpy()
+    for drawn in sets:
+        assert len(drawn.rows) == 50
+        assert set(objects[drawn.rows]) == set(drawn.training_objects)
+        assert len(drawn.training_objects) == 2
+    assert len(sets_of(training_objects=9)[1][0].training_objects) == 2  # one stays novel

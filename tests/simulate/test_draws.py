@@ -1,5 +1,7 @@
 """The drawn trials keep to the protocol: ranges, halves, lips, axes, poses."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -160,3 +162,19 @@ def test_the_lip_is_the_rim_point_nearest_to_the_second_on_approach(oval, bowl, 
         # An oval's nearest point moves a little as the cup is shifted sideways onto the line through its lip.
         assert lip - distances.min() < 0.004
         assert lip < np.quantile(distances, 0.2)
+
+
+def test_absolute_ranges_are_those_of_one_cup_and_end_where_the_object_is_full(oval, bowl):
+    pouring, filling = replace(POURING, ranges="absolute"), replace(FILLING, ranges="absolute")
+    for cup in (oval, bowl):
+        fills = [draws.draw_pouring(cup, pouring, np.random.default_rng(i)).fill_m3 for i in range(N)]
+        most = min(draws.CUP_M3, cup.capacity_m3)
+        assert 0.95 * most < max(fills) <= most
+    drawn = [
+        draws.draw_filling(oval, HEIGHT_M, bowl, PARTICLE_M3, filling, i, np.random.default_rng(i))
+        for i in range(N)
+    ]
+    assert 0.97 * 1.5 * draws.CUP_RADIUS_M < max(abs(draw.dx_m) for draw in drawn) <= 1.5 * draws.CUP_RADIUS_M
+    heights = [draw.dz_m for draw in drawn]
+    assert min(heights) >= draws.CUP_HEIGHT_M * 0.1
+    assert 0.97 * draws.CUP_HEIGHT_M < max(heights) <= draws.CUP_HEIGHT_M

@@ -11,7 +11,12 @@ from pipeline.track.store import client
 OBJECTS = {"mug", "short_cup", "wide_bowl"}
 ASSEMBLED = {"assemble_parameters", "assemble_tilt_references"}
 ESTIMATED = {"assemble_uncertainties", "draw_parameters"}
-CLASSIFIED = {"classify pouring", "classify filling", "report"}
+REPORTED = {"report", "report_evaluation"}
+CLASSIFIED = {"classify pouring", "classify filling"} | REPORTED
+LEARNT = {"classify_learning pouring", "classify_learning filling"} | CLASSIFIED
+POURED, FILLED = (
+    {f"classify {name}", f"classify_learning {name}"} | REPORTED for name in ("pouring", "filling")
+)
 
 
 def _each(rule: str, objects=frozenset(OBJECTS)) -> set[str]:
@@ -20,10 +25,10 @@ def _each(rule: str, objects=frozenset(OBJECTS)) -> set[str]:
 
 FUSED = _each("fuse") | _each("draw_scan")
 LABELLED = {"learn"} | _each("label")
-SIMULATED = _each("simulate_pouring") | _each("simulate_filling") | CLASSIFIED
+SIMULATED = _each("simulate_pouring") | _each("simulate_filling") | LEARNT
 CONTAINED = _each("simulate_container") | SIMULATED | {"draw_parameters"}
 COMPARED = _each("accuracy")
-PARAMETRISED = _each("parametrise") | ASSEMBLED | COMPARED | CLASSIFIED
+PARAMETRISED = _each("parametrise") | ASSEMBLED | COMPARED | LEARNT
 UNCERTAIN = _each("uncertainties") | ESTIMATED | COMPARED | {"report"}
 WARPED = _each("warp") | PARAMETRISED | UNCERTAIN | {"draw_labels"}
 
@@ -34,7 +39,7 @@ def _of_one(name: str) -> set[str]:
         *("fuse", "draw_scan", "label", "warp", "parametrise", "uncertainties"),
         *("simulate_container", "simulate_pouring", "simulate_filling"),
     )
-    return {f"{stage} {name}" for stage in stages} | ASSEMBLED | ESTIMATED | CLASSIFIED | {"draw_labels"}
+    return {f"{stage} {name}" for stage in stages} | ASSEMBLED | ESTIMATED | LEARNT | {"draw_labels"}
 
 
 def _runs(project) -> list:
@@ -94,14 +99,22 @@ def test_one_core_gives_the_same_bytes_as_two(finished, unfinished):
         ("simulate.engine", "bullet", SIMULATED),
         ("simulate.device", "cuda", SIMULATED),
         ("simulate.physics.convergence_trials", 3, set()),
-        ("simulate.pouring.tilt_max_deg", 90.0, _each("simulate_pouring") | {"classify pouring", "report"}),
-        ("simulate.filling.tilt_deg", 90.0, _each("simulate_filling") | {"classify filling", "report"}),
+        ("simulate.ranges", "absolute", SIMULATED),
+        ("simulate.pouring.tilt_max_deg", 90.0, _each("simulate_pouring") | POURED),
+        ("simulate.filling.tilt_deg", 90.0, _each("simulate_filling") | FILLED),
         (
             "simulate.filling.held_objects",
             ["short_cup", "mug"],
-            _each("simulate_filling") | {"classify filling", "report"},
+            _each("simulate_filling") | FILLED,
         ),
         ("classify.draws", 4, CLASSIFIED),
+        ("classify.terms", "quadratic", LEARNT),
+        (
+            "classify.learning_draws",
+            3,
+            {"classify_learning pouring", "classify_learning filling", "report_evaluation"},
+        ),
+        ("ablate.draws", 3, set()),
         ("track.experiment", "another", set()),
     ],
 )
@@ -124,6 +137,24 @@ def test_the_pages_on_physics_are_made_when_they_are_asked_for(project):
             assert sum(f"--engine {other} " in line for line in commands) == len(others)
 
 
+def test_ablations_are_made_when_they_are_asked_for_and_reuse_what_their_key_does_not_move(project):
+    planned = project.planned("reports/ablations.pdf")
+    assert {"report_ablations", "ablate_labels wide_bowl"} <= planned
+    assert not {job for job in planned if job.split()[0].startswith(("fuse", "label", "simulate", "warp"))}
+    told = project.call("-n", "-p", "reports/ablations.pdf").stdout
+    commands = [line for line in told.splitlines() if "python -m pipeline." in line]
+    simulated = [line for line in commands if "pipeline.simulate" in line]
+    assert len(simulated) == 2 * len(OBJECTS)
+    assert all("--ranges absolute" in line for line in simulated)
+    for changed in (
+        "--terms quadratic",
+        "--penalty firth",
+        "--held-cups disjoint",
+        "--volume cavity --margin none",
+    ):
+        assert any(changed in line for line in commands), changed
+
+
 def test_two_keys_that_swap_their_values_are_a_change(project):
     project.configure("classify.samples", 3)
     project.configure("classify.draws", 50)
@@ -137,7 +168,7 @@ def test_two_keys_that_swap_their_values_are_a_change(project):
         ("label/features.py", LABELLED | WARPED),
         ("simulate/trials.py", SIMULATED),
         ("simulate/fields.py", CONTAINED),
-        ("classify/regression.py", CLASSIFIED),
+        ("classify/regression.py", LEARNT),
         ("report/roc.py", {"report"}),
         ("track/store.py", set()),
         ("workflow/objects.py", set()),
@@ -193,7 +224,7 @@ def test_an_object_is_dropped_and_taken_away_again(project):
 
     (project / "data/raw/my_cup/cup.ply").unlink()
     (project / "data/raw/my_cup").rmdir()
-    assert project.planned() == ASSEMBLED | ESTIMATED | CLASSIFIED | {"draw_labels"}
+    assert project.planned() == ASSEMBLED | ESTIMATED | LEARNT | {"draw_labels"}
     assert project.call().returncode == 0
     after = project.contents()
     assert [path for path in before if before[path] != after.get(path)] == []

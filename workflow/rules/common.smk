@@ -53,9 +53,9 @@ def code(*entries):
         sys.exit(f"error: {error}")
 
 
-def options(section, *keys):
+def options(section, *keys, of=config):
     """Return `--key value …` for the keys of a section: one text, as Snakemake compares the values of params, not their names."""
-    values = config
+    values = of
     for name in section.split("."):
         values = values[name]
     words = {key: values[key] if isinstance(values[key], list) else [values[key]] for key in keys}
@@ -65,6 +65,12 @@ def options(section, *keys):
 def each(pattern, names=OBJECTS):
     """Return `pattern` filled in for every object, source and experiment."""
     return expand(pattern, object=names, source=SOURCE)
+
+
+def named(option, pattern, wanted=True):
+    """Return `--option NAME=PATH …` with the path of each object when it is wanted, else nothing."""
+    words = " ".join(f"{name}={path}" for name, path in zip(OBJECTS, each(pattern)))
+    return f"--{option} {words}" if wanted else ""
 
 
 wildcard_constraints:

@@ -4,6 +4,8 @@
 #       reports/parameters.pdf, every parameter on its object and against known values, and reports/parameters.json, volumes side by side;
 #       reports/scans/<object>.png, a page on each scan;
 #       when asked for, reports/sources.pdf and .json, every demonstration object as the source for every other;
+#       reports/evaluation.pdf and .json, how sure the scores are and what that says of the paper's claims;
+#       when asked for, reports/ablations.pdf and .json, the scores with one key changed at a time;
 #       when asked for, reports/physics.pdf and reports/physics.json, the liquid against hydrostatics and against Bullet's spheres.
 # How: one module a figure; truth is compared here and nowhere else.
 
@@ -62,6 +64,58 @@ rule report:
         "python -m pipeline.report.roc --curves {input.curves:q} --scores {input.scores:q} --output {output.roc:q} > {log:q} 2>&1\n"
         "python -m pipeline.report.metrics --processed {params.processed:q} --source {params.source} --objects {params.objects}"
         " --accuracy {input.accuracy:q} --output {output.metrics:q} >> {log:q} 2>&1"
+
+
+rule report_evaluation:
+    input:
+        replicates=expand(rules.classify.output.replicates, experiment=EXPERIMENTS),
+        pairs=expand(rules.classify.output.pairs, experiment=EXPERIMENTS),
+        learning=expand(rules.classify_learning.output.learning, experiment=EXPERIMENTS),
+        scores=expand(rules.classify.output.scores, experiment=EXPERIMENTS),
+        predictions=expand(rules.classify.output.predictions, experiment=EXPERIMENTS),
+        fillings=each(rules.simulate_filling.output.trials),
+    output:
+        page=f"{REPORTS}/evaluation.pdf",
+        numbers=f"{REPORTS}/evaluation.json",
+    log:
+        "logs/report/evaluation.log",
+    benchmark:
+        "benchmarks/report/evaluation.tsv"
+    threads: 1
+    params:
+        options=options("classify", "resamples", "seed"),
+        code=code("pipeline.report.evaluation"),
+    shell:
+        "python -m pipeline.report.evaluation --replicates {input.replicates:q} --pairs {input.pairs:q} --learning {input.learning:q}"
+        " --scores {input.scores:q} --predictions {input.predictions:q} --fillings {input.fillings:q} --page {output.page:q}"
+        " --numbers {output.numbers:q} {params.options} > {log:q} 2>&1"
+
+
+rule report_ablations:
+    input:
+        replicates=[
+            path.format(variant=variant, experiment=experiment)
+            for path in [rules.ablate.output.replicates]
+            for variant, experiment in ABLATED
+        ],
+        scores=[
+            path.format(variant=variant, experiment=experiment)
+            for path in [rules.ablate.output.scores]
+            for variant, experiment in ABLATED
+        ],
+    output:
+        page=f"{REPORTS}/ablations.pdf",
+        numbers=f"{REPORTS}/ablations.json",
+    log:
+        "logs/report/ablations.log",
+    threads: 1
+    params:
+        variants=" ".join(f"{variant}={key}:{value}" for variant, (key, value) in VARIANTS.items()),
+        trials=options("ablate", "trials", "draws"),
+        code=code("pipeline.report.ablations"),
+    shell:
+        "python -m pipeline.report.ablations --replicates {input.replicates:q} --scores {input.scores:q} --variants {params.variants}"
+        " {params.trials} --page {output.page:q} --numbers {output.numbers:q} > {log:q} 2>&1"
 
 
 TARGETS = [name for name in OBJECTS if name != SOURCE]

@@ -43,7 +43,7 @@ rule simulate_pouring:
         "benchmarks/simulate/pouring/{object}.tsv"
     threads: 1
     params:
-        shared=options("simulate", "engine", "device", "seed"),
+        shared=options("simulate", "engine", "device", "ranges", "seed"),
         options=options("simulate.pouring", "trials", "fill_min", "fill_max", "tilt_max_deg", "threshold"),
         code=code("pipeline.simulate"),
     shell:
@@ -65,7 +65,7 @@ rule simulate_filling:
     params:
         # The order of the cups decides which one a trial draws.
         held=" ".join(f"{name}={PROCESSED}/simulate/containers/{name}.npz" for name in HELD),
-        shared=options("simulate", "engine", "device", "seed"),
+        shared=options("simulate", "engine", "device", "ranges", "seed"),
         options=options(
             "simulate.filling",
             "trials",
@@ -130,7 +130,7 @@ use rule simulate_pouring as simulate_pouring_other with:
     benchmark:
         "benchmarks/simulate/physics/{object}_{engine}_pouring.tsv"
     params:
-        shared=options("simulate", "seed") + " --engine {engine}",
+        shared=options("simulate", "ranges", "seed") + " --engine {engine}",
         options=options("simulate.pouring", "fill_min", "fill_max", "tilt_max_deg", "threshold")
         + f" --trials {config['simulate']['physics']['engine_pours']}",
         code=code("pipeline.simulate"),
@@ -145,7 +145,7 @@ use rule simulate_filling as simulate_filling_other with:
         "benchmarks/simulate/physics/{object}_{engine}_filling.tsv"
     params:
         held=rules.simulate_filling.params.held,
-        shared=options("simulate", "seed") + " --engine {engine}",
+        shared=options("simulate", "ranges", "seed") + " --engine {engine}",
         options=options(
             "simulate.filling",
             "held_particles",

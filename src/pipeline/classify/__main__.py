@@ -3,54 +3,42 @@
 from pathlib import Path
 
 from pipeline import command
-from pipeline.artefacts import read_table, write_table
-
-LABELS = {"pouring": "poured", "filling": "filled"}
+from pipeline.artefacts import write_table
+from pipeline.classify import inputs
 
 
 def main() -> None:
-    """Read all objects' trials and warped parameters; write predictions, scores, ROC curves and the classifiers."""
-    parser = command.parser(__doc__)
-    parser.add_argument("--experiment", choices=list(LABELS), required=True)
-    parser.add_argument("--trials", type=Path, nargs="+", required=True, help="one table an object")
-    for option in ("--parameters", "--tilt-references", "--predictions", "--scores", "--curves", "--models"):
+    """Read all objects' trials and warped parameters; write how well classifiers do, and the classifiers themselves."""
+    parser = inputs.parser(__doc__)
+    for option in ("--scores", "--replicates"):
         parser.add_argument(option, type=Path, required=True)
-    parser.add_argument("--samples", type=int, default=50, help="trials a classifier is trained on")
-    parser.add_argument("--draws", type=int, default=20, help="training sets an object")
-    parser.add_argument("--ridge", type=float, default=1.0, help="weight of the squared standardised weights")
-    parser.add_argument("--seed", type=int, default=0)
+    for option in ("--predictions", "--curves", "--models", "--pairs"):
+        parser.add_argument(option, type=Path, help="left out when not named")
     options = parser.parse_args()
 
     import pandas as pd
 
-    from pipeline.classify.features import FEATURE_SETS, MAPPINGS, features, parameters_of
-    from pipeline.classify.protocol import ceiling, evaluate
+    from pipeline.classify.protocol import Results, ceiling, evaluate
     from pipeline.models import write_models
+    from pipeline.statistics.resampling import Resampled, object_weights
 
-    trials = pd.concat([read_table(path, "trials") for path in options.trials], ignore_index=True)
-    trials = trials[~trials["failed"]].reset_index(drop=True)
-    parameters = read_table(options.parameters, "parameters")
-    references = read_table(options.tilt_references, "tilt_references")
-    mappings = {mapping: parameters_of(parameters, references, mapping) for mapping in MAPPINGS}
-    feature_sets = {
-        name: features(trials, mappings.get(name, mappings["label_mapping"]), standard=name not in mappings)
-        for name in FEATURE_SETS
-    }
-    label = LABELS[options.experiment]
-    results = evaluate(
-        trials,
-        label,
-        feature_sets,
-        samples=options.samples,
-        draws=options.draws,
-        ridge=options.ridge,
-        seed=options.seed,
-    )
-    ceiling(trials, label, results)
-    write_table(options.predictions, pd.concat(results.predictions, ignore_index=True), "predictions")
+    given, protocol = inputs.read(options), inputs.protocol(options)
+    names = [str(name) for name in pd.unique(given.trials["object"])]
+    resampled = Resampled(names, object_weights(len(names), options.resamples, options.seed))
+    results = Results(resampled, keep_predictions=options.predictions is not None)
+    evaluate(given.trials, given.labels, given.feature_sets, protocol, results)
+    ceiling(given.trials, given.labels, results)
+    head = {"experiment": options.experiment, "samples": protocol.samples}
     write_table(options.scores, pd.DataFrame(results.scores), "scores")
-    write_table(options.curves, pd.concat(results.curves, ignore_index=True), "curves")
-    write_models(options.models, results.models)
+    write_table(options.replicates, resampled.table("features", "split").assign(**head), "replicates")
+    if options.predictions:
+        write_table(options.predictions, pd.concat(results.predictions, ignore_index=True), "predictions")
+    if options.curves:
+        write_table(options.curves, pd.concat(results.curves, ignore_index=True), "curves")
+    if options.models:
+        write_models(options.models, results.models)
+    if options.pairs:
+        write_table(options.pairs, resampled.pairs("features", "split").assign(**head), "pairs")
 
 
 if __name__ == "__main__":

@@ -12,14 +12,48 @@ from pipeline.classify.regression import FPR_GRID, Score, classifier, iterations
 from pipeline.classify.trained import trained
 from pipeline.errors import PipelineError
 from pipeline.models import Model
+from pipeline.statistics.resampling import Resampled
 
 MAX_REDRAWS = 1000
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """How classifiers are trained and tested; the defaults are the paper's, and what it leaves open.
+
+    A set of `samples` trials is from `training_objects` objects. held_cups disjoint: half of the held cups, drawn anew for each
+    set, are in training sets, the others in tests.
+    """
+
+    samples: int
+    draws: int
+    seed: int
+    ridge: float = 1.0
+    penalty: str = "ridge"
+    terms: str = "linear"
+    volume: str = "hull"
+    margin: str = "none"
+    training_objects: int = 1
+    held_cups: str = "shared"
+
+
+@dataclass(frozen=True)
+class TrainingSet:
+    """The rows of a training set, how often it was redrawn, and which rows (N,) its classifiers may be tested on."""
+
+    training_objects: tuple[str, ...]
+    draw: int
+    rows: np.ndarray
+    n_redrawn: int
+    testable: np.ndarray
 
 
 @dataclass
 class Results:
     """Rows of the tables `predictions` (a frame a classifier), `scores` and `curves`, and the classifiers themselves."""
 
+    resampled: Resampled
+    keep_predictions: bool = True
     predictions: list[pd.DataFrame] = field(default_factory=list)
     scores: list[dict[str, Any]] = field(default_factory=list)
     curves: list[pd.DataFrame] = field(default_factory=list)
@@ -56,82 +90,111 @@ def draw_training_set(
 
 def evaluate(
     trials: pd.DataFrame,
-    label: str,
+    labels: np.ndarray,
     feature_sets: dict[str, np.ndarray],
-    *,
-    samples: int,
-    draws: int,
-    ridge: float,
-    seed: int,
-) -> Results:
-    """Train and test every feature set on every object; `trials` (N rows), `label` a column, features (N, F) each.
+    protocol: Protocol,
+    results: Results,
+) -> None:
+    """Train and test every feature set on every object: `trials` (N rows), labels (N,), features (N, F) each.
 
     All feature sets see the same draws. The draws of an object depend on its name and the seed alone.
     """
-    results = Results()
-    labels = trials[label].to_numpy(bool)
-    for head, rows, redrawn in _training_sets(trials, labels, samples, draws, seed):
-        for features, values in feature_sets.items():
-            fitted = classifier(ridge).fit(values[rows], labels[rows])
-            n_iterations, converged = iterations(fitted)
-            training = {
-                **{"n_iterations": n_iterations, "converged": converged, "n_redrawn": redrawn},
-                "separable": separable(values[rows], labels[rows]),
-            }
-            results.models.append(trained(fitted, {**head, "features": features}, ridge, len(rows), training))
-            probability = fitted.predict_proba(values)[:, 1]
-            _test(results, {**head, "features": features}, trials, labels, probability, rows, training)
-    return results
-
-
-def _training_sets(
-    trials: pd.DataFrame, labels: np.ndarray, samples: int, draws: int, seed: int
-) -> Iterator[tuple[dict[str, Any], np.ndarray, int]]:
-    """Yield for each object and draw: what it is called, the rows drawn, and how often they were redrawn."""
     experiment = str(trials["experiment"].iloc[0])
+    for drawn in training_sets(trials, labels, protocol):
+        for features, values in feature_sets.items():
+            fitted, training = fit(values[drawn.rows], labels[drawn.rows], protocol, drawn.n_redrawn)
+            results.models.append(trained(fitted, experiment, features, drawn, protocol, training))
+            probability = fitted.predict_proba(values)[:, 1]
+            _test(results, features, trials, labels, probability, drawn, training)
+
+
+def fit(
+    values: np.ndarray, labels: np.ndarray, protocol: Protocol, n_redrawn: int
+) -> tuple[Any, dict[str, Any]]:
+    """Return a classifier fitted to features (N, F) and labels (N,), and what is to be said of the fit."""
+    fitted = classifier(protocol.ridge, protocol.penalty, protocol.terms).fit(values, labels)
+    n_iterations, converged = iterations(fitted)
+    terms = fitted[:-1].transform(values)
+    training = {"n_iterations": n_iterations, "converged": converged, "n_redrawn": n_redrawn}
+    return fitted, {**training, "separable": separable(terms, labels)}
+
+
+def training_sets(trials: pd.DataFrame, labels: np.ndarray, protocol: Protocol) -> Iterator[TrainingSet]:
+    """Yield the training sets of each object and draw."""
+    experiment = str(trials["experiment"].iloc[0])
+    objects = trials["object"].to_numpy()
     for name in pd.unique(trials["object"]):
-        own = np.flatnonzero(trials["object"] == name)
-        for draw in range(draws):
-            key = (seed, zlib.crc32(f"{experiment}/{name}".encode()), draw)
-            chosen, redrawn = draw_training_set(labels[own], samples, key, name=f"{experiment}/{name}")
-            yield {"experiment": experiment, "training_object": name, "draw": draw}, own[chosen], redrawn
+        for draw in range(protocol.draws):
+            key = (protocol.seed, zlib.crc32(f"{experiment}/{name}".encode()), draw)
+            chosen = _training_objects(str(name), objects, protocol, key)
+            for_training, testable = _held_cups(trials, protocol, key)
+            own = np.flatnonzero(np.isin(objects, chosen) & for_training)
+            rows, redrawn = draw_training_set(labels[own], protocol.samples, key, name=f"{experiment}/{name}")
+            yield TrainingSet(chosen, draw, own[rows], redrawn, testable)
+
+
+def _training_objects(
+    name: str, objects: np.ndarray, protocol: Protocol, key: tuple[int, ...]
+) -> tuple[str, ...]:
+    """Return the object and as many others, at random, as the protocol asks for."""
+    others = [str(other) for other in pd.unique(objects) if other != name]
+    n_others = min(protocol.training_objects - 1, max(0, len(others) - 1))  # one stays novel
+    return (name, *np.random.default_rng((*key, 2)).choice(others, n_others, replace=False).tolist())
+
+
+def _held_cups(
+    trials: pd.DataFrame, protocol: Protocol, key: tuple[int, ...]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return which trials (N,) may train and which may test; in pouring, where the cup is the object, all may."""
+    held = trials["held_object"].to_numpy()
+    if protocol.held_cups == "shared" or (held == trials["object"]).all():
+        every = np.ones(len(trials), dtype=bool)
+        return every, every
+    cups = np.random.default_rng((*key, 1)).permutation(np.unique(held.astype(str)))
+    for_training = np.isin(held, cups[: (len(cups) + 1) // 2])
+    return for_training, ~for_training
 
 
 def _test(
     results: Results,
-    head: dict[str, Any],
+    features: str,
     trials: pd.DataFrame,
     labels: np.ndarray,
     probability: np.ndarray,
-    training_rows: np.ndarray,
+    drawn: TrainingSet,
     training: dict[str, Any],
 ) -> None:
-    objects = trials["object"].to_numpy()
-    for split, rows in _splits(objects, head["training_object"], training_rows):
-        full = {**head, "split": split}
+    objects, name = trials["object"].to_numpy(), drawn.training_objects[0]
+    head = {"experiment": trials["experiment"].iloc[0], "training_object": name, "draw": drawn.draw}
+    for split, rows in splits(objects, drawn):
+        full = {**head, "features": features, "split": split}
         results.add_score(full, score(labels[rows], probability[rows]), labels[rows], training)
-        tested = {"test_object": objects[rows], "trial": trials["trial"].to_numpy()[rows]}
-        outcome = {"probability": probability[rows].astype(np.float32), "label": labels[rows]}
-        results.predictions.append(pd.DataFrame({**full, **tested, **outcome}))
+        results.resampled.add((features, split), name, objects[rows], labels[rows], probability[rows])
+        if results.keep_predictions:
+            tested = {"test_object": objects[rows], "trial": trials["trial"].to_numpy()[rows]}
+            outcome = {"probability": probability[rows].astype(np.float32), "label": labels[rows]}
+            results.predictions.append(pd.DataFrame({**full, **tested, **outcome}))
 
 
-def _splits(
-    objects: np.ndarray, training_object: str, training_rows: np.ndarray
-) -> Iterator[tuple[str, np.ndarray]]:
-    own = np.flatnonzero(objects == training_object)
-    yield "same", np.setdiff1d(own, training_rows)
-    novel = np.flatnonzero(objects != training_object)
+def splits(objects: np.ndarray, drawn: TrainingSet) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield `same` and the rows of the training objects that were not drawn, then `novel` and those of other objects."""
+    own = np.isin(objects, drawn.training_objects)
+    yield "same", np.setdiff1d(np.flatnonzero(own & drawn.testable), drawn.rows)
+    novel = np.flatnonzero(~own & drawn.testable)
     if len(novel):
         yield "novel", novel
 
 
-def ceiling(trials: pd.DataFrame, label: str, results: Results) -> None:
+def ceiling(trials: pd.DataFrame, labels: np.ndarray, results: Results) -> None:
     """Add the hydrostatic answer to the same trials as features `hydrostatic`: nothing is trained, draw 0."""
     training = {"n_iterations": 0, "converged": True, "n_redrawn": 0, "separable": False}
-    objects = trials["object"].to_numpy()
-    labels, margins = trials[label].to_numpy(bool), trials["hydrostatic_margin"].to_numpy()
-    for name in pd.unique(trials["object"]):
-        for split, rows in _splits(objects, name, np.array([], dtype=int)):
+    objects, margins = trials["object"].to_numpy(), trials["hydrostatic_margin"].to_numpy()
+    every = np.ones(len(trials), dtype=bool)
+    for name in map(str, pd.unique(trials["object"])):
+        for split, rows in splits(objects, TrainingSet((name,), 0, np.array([], dtype=int), 0, every)):
             head = {"experiment": trials["experiment"].iloc[0], "features": "hydrostatic", "split": split}
             outcome = score(labels[rows], margins[rows], margins=True)
             results.add_score({**head, "training_object": name, "draw": 0}, outcome, labels[rows], training)
+            results.resampled.add(
+                ("hydrostatic", split), name, objects[rows], labels[rows], margins[rows], margins=True
+            )

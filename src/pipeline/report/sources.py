@@ -45,20 +45,18 @@ def main() -> None:
 def matrices(processed: Path, names: list[str]) -> "dict[str, np.ndarray]":
     """Return error → (sources, targets), absolute, by label mapping."""
     import numpy as np
+    import pandas as pd
 
-    from pipeline.artefacts import points
-    from pipeline.geometry import hulls
     from pipeline.report.accuracy import label_scores, parameter_errors, read_truth, true_parts
 
     found = {key: np.zeros((len(names), len(names))) for key in PANELS}
     for column, target in enumerate(names):
         truth = read_truth(processed, target)
-        inside_m = hulls.points_in_hull(points(truth.cloud[truth.cloud["container"]]), 20000)
         parts = true_parts(read_table(processed / "fuse" / target / "cloud.parquet", "cloud"), truth)
         for row, source in enumerate(names):
             table = read_table(processed / "parametrise" / source / f"{target}.parquet", "parameters")
             values = table.set_index("mapping").loc["label_mapping"]
-            errors = parameter_errors(values, truth, inside_m)
+            errors = parameter_errors(values, pd.Series(dtype=float), truth)
             mapped = read_table(processed / "warp" / source / target / "label_mapping.parquet", "mapping")
             errors["rim_missed"] = 1.0 - label_scores(mapped, parts)["rim.iou"]
             for key, matrix in found.items():

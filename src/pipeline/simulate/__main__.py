@@ -49,6 +49,12 @@ def _options() -> argparse.Namespace:
         experiment.add_argument(
             "--device", default="cpu", choices=("cpu", "cuda"), help="what the liquid is computed on"
         )
+        experiment.add_argument(
+            "--ranges",
+            default="relative",
+            choices=("relative", "absolute"),
+            help="to the objects, or absolute",
+        )
         experiment.add_argument("--seed", type=int, default=4, help="of the whole experiment")
         experiment.add_argument("--trials", type=int, default=1000, help="number of trials")
     pouring.add_argument("--fill-min", type=float, default=0.05, help="least fill, share of the capacity")
@@ -90,7 +96,11 @@ def _pouring(options: argparse.Namespace) -> list[dict]:
 
     engine, card = engines.engine(options.engine), batches.card(options.device, options.engine)
     protocol = draws.Pouring(
-        options.fill_min, options.fill_max, float(np.radians(options.tilt_max_deg)), options.threshold
+        options.fill_min,
+        options.fill_max,
+        float(np.radians(options.tilt_max_deg)),
+        options.threshold,
+        options.ranges,
     )
     cup = prepared.from_arrays(options.object, artefacts.read_arrays(options.container), engine)
     numbers = command.progress(range(options.trials), options.trials, f"pouring {options.object}")
@@ -112,6 +122,7 @@ def _filling(options: argparse.Namespace) -> list[dict]:
         height_min=options.height_min,
         height_max=options.height_max,
         free_room_max_particles=options.free_room_max_particles,
+        ranges=options.ranges,
     )
     second = prepared.from_arrays(options.object, artefacts.read_arrays(options.container), engine)
     held = [

@@ -12,15 +12,23 @@ import numpy as np
 from pipeline.geometry import frames
 from pipeline.geometry.cavity import Cavity, lip_alone, lip_towards, pour_axis
 
+# With absolute ranges shares are of these instead of the objects at hand; fills end where the object is full. The height is
+# enough for a tall cup to hang above a wide bowl.
+CUP_M3, CUP_RADIUS_M, CUP_HEIGHT_M = 2.5e-4, 0.060, 0.150
+
 
 @dataclass(frozen=True)
 class Pouring:
-    """Ranges of the pouring experiment: fill as a share of the capacity, tilt in radians, particles that make a pour."""
+    """Ranges of the pouring experiment: fill as a share of the capacity, tilt in radians, particles that make a pour.
+
+    `ranges`: relative to the object, or absolute.
+    """
 
     fill_min: float
     fill_max: float
     tilt_max_rad: float
     threshold: int
+    ranges: str = "relative"
 
 
 @dataclass(frozen=True)
@@ -33,6 +41,7 @@ class Filling:
     height_min: float
     height_max: float
     free_room_max_particles: int
+    ranges: str = "relative"
 
 
 @dataclass(frozen=True)
@@ -86,7 +95,8 @@ def opening_radius_m(cavity: Cavity) -> float:
 
 def draw_pouring(cup: Cavity, protocol: Pouring, rng: np.random.Generator) -> PouringDraw:
     """Draw a pour of a cup alone: fill and tilt uniform, the lip at the rim's lowest point."""
-    fill = rng.uniform(protocol.fill_min, protocol.fill_max) * cup.capacity_m3
+    share = rng.uniform(protocol.fill_min, protocol.fill_max)
+    fill = share * (cup.capacity_m3 if protocol.ranges == "relative" else min(CUP_M3, cup.capacity_m3))
     lip = lip_alone(cup)
     return PouringDraw(fill, rng.uniform(0.0, protocol.tilt_max_rad), lip, pour_axis(cup.opening_m, lip))
 
@@ -113,9 +123,10 @@ def draw_filling(
     shift, the nearest point of a round rim would always face the centre, and dy would be zero in every trial.)
     """
     heading, yaw = rng.uniform(-np.pi, np.pi, 2)
-    radius_m = opening_radius_m(second)
+    relative = protocol.ranges == "relative"
+    radius_m = opening_radius_m(second) if relative else CUP_RADIUS_M
     dx, dy = rng.uniform(-1.0, 1.0, 2) * protocol.offset_max_radii * radius_m
-    dz = rng.uniform(protocol.height_min, protocol.height_max) * held_height_m
+    dz = rng.uniform(protocol.height_min, protocol.height_max) * (held_height_m if relative else CUP_HEIGHT_M)
     half, second_fill_m3 = _second_fill(second, particle_m3, protocol, trial, rng.uniform())
 
     standoff_m = protocol.offset_max_radii * radius_m + opening_radius_m(held)
@@ -137,7 +148,8 @@ def _second_fill(
 ) -> tuple[str, float]:
     """Return a trial's half and the second's fill: even trials a share of the capacity, odd ones near the brim."""
     if trial % 2 == 0:
-        return "relative", share * second.capacity_m3
+        whole_m3 = second.capacity_m3 if protocol.ranges == "relative" else min(CUP_M3, second.capacity_m3)
+        return "relative", share * whole_m3
     free_m3 = share * protocol.free_room_max_particles * particle_m3
     return "free_room", max(0.0, second.capacity_m3 - free_m3)
 

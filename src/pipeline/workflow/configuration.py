@@ -121,6 +121,9 @@ def _check_pairs(config: dict) -> None:
         _below(
             "classify.samples", config["classify"]["samples"], f"simulate.{name}.trials", section["trials"]
         )
+        most = max(config["classify"]["learning_samples"])
+        _below("classify.learning_samples", most, f"simulate.{name}.trials", section["trials"])
+    _below("classify.samples", config["classify"]["samples"], "ablate.trials", config["ablate"]["trials"])
     if simulate["device"] == "cuda" and simulate["engine"] != "liquid":
         raise PipelineError(
             f"simulate.device: expected cpu with simulate.engine {simulate['engine']}, found cuda, which computes the "
