@@ -4,6 +4,7 @@
 #   make all               everything that the workflow makes
 #   make test              lint, then every test
 #   make setup             .venv alone
+#   make track             record in MLflow the calls that it lacks
 
 SHELL := /bin/bash
 CORES ?= 2
@@ -15,7 +16,7 @@ SYSTEM_LIBRARIES := libegl1 libgl1 libgomp1 libusb-1.0-0
 PYTHONS := python3.11 python3.12 python3
 TYPED := src
 
-.PHONY: all test lint setup format FORCE
+.PHONY: all test lint setup format track FORCE
 .DELETE_ON_ERROR:
 
 all: $(STAMP)
@@ -39,6 +40,9 @@ format: $(STAMP)
 	$(BIN)/snakefmt --line-length 110 Snakefile workflow
 
 setup: $(STAMP)
+
+track: $(STAMP)
+	$(BIN)/python -m pipeline.track again
 
 $(STAMP): requirements.txt pyproject.toml
 	@set -e; \
