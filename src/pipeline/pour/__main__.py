@@ -62,6 +62,9 @@ def _add(subcommands: "argparse._SubParsersAction[argparse.ArgumentParser]", mod
 class _Help(argparse.ArgumentDefaultsHelpFormatter, argparse.RawDescriptionHelpFormatter):
     """Docstrings as they are written, and defaults."""
 
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        return action.help if action.default in (None, False) else super()._get_help_string(action)
+
 
 def script() -> None:
     """Run as the console script `pour`."""
