@@ -4,6 +4,8 @@
 #   make all               everything that the workflow makes
 #   make test              lint, then every test
 #   make setup             .venv alone
+#   make track             record in MLflow the calls that it lacks
+#   make mlflow-server     a team's MLflow on PostgreSQL, until Ctrl-C (SERVER="--host 0.0.0.0 --allowed-hosts …" make …)
 
 SHELL := /bin/bash
 CORES ?= 2
@@ -15,7 +17,7 @@ SYSTEM_LIBRARIES := libegl1 libgl1 libgomp1 libusb-1.0-0
 PYTHONS := python3.11 python3.12 python3
 TYPED := src
 
-.PHONY: all test lint setup format FORCE
+.PHONY: all test lint setup format track mlflow-server FORCE
 .DELETE_ON_ERROR:
 
 all: $(STAMP)
@@ -39,6 +41,12 @@ format: $(STAMP)
 	$(BIN)/snakefmt --line-length 110 Snakefile workflow
 
 setup: $(STAMP)
+
+track: $(STAMP)
+	$(BIN)/python -m pipeline.track again
+
+mlflow-server: $(STAMP)
+	$(BIN)/python -m pipeline.track.server $(SERVER)
 
 $(STAMP): requirements.txt pyproject.toml
 	@set -e; \

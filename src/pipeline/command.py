@@ -34,8 +34,13 @@ def say(message: str) -> None:
     sys.stderr.flush()
 
 
-def progress(items: Iterable[T], total: int, what: str, every_s: float = 5.0) -> Iterator[T]:
-    """Yield `items`, saying every few seconds how many of `total` are done, the rate and the time left."""
+def progress(items: Iterable[T], total: int, what: str, every_s: float = 10.0) -> Iterator[T]:
+    """Yield `items` with a bar on a terminal, and in a log with a line every few seconds: how many, the rate, the time left."""
+    if sys.stderr.isatty():
+        from tqdm import tqdm
+
+        yield from tqdm(items, what, total, file=sys.stderr, leave=False, dynamic_ncols=True)
+        return
     start = said = time.monotonic()
     for done, item in enumerate(items):
         now = time.monotonic()

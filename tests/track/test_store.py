@@ -1,124 +1,189 @@
 """The runs of a call, read back from a real store; and a broken store costs no more than a warning."""
 
-import json
 import os
-import subprocess
-import sys
+import shutil
 import time
+from pathlib import Path
 
-import pandas as pd
 import pytest
+from track.calls import OBJECTS, end, leave, track
 
-from pipeline.artefacts import write_table
 from pipeline.track.store import client
 
-CONFIG = {"classify": {"draws": 3}, "simulate": {"pouring": {"trials": 80}}, "track": {"experiment": "tried"}}
 
-
-def _track(folder, *arguments, **environment):
-    kept = {key: value for key, value in os.environ.items() if key != "MLFLOW_TRACKING_URI"}
-    return subprocess.Popen(
-        [sys.executable, "-m", "pipeline.track", *arguments],
-        **{"cwd": folder, "env": kept | environment, "text": True},
-        **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE},
-    )
-
-
-def _end(folder, status, since_s, **environment):
-    folders = [word for name in ("raw", "processed", "reports", "benchmarks") for word in (f"--{name}", name)]
-    job = _track(
-        folder,
-        *("end", "--status", status, "--since", str(since_s), "--log", "call.log", "--config", "config.json"),
-        *(*folders, "--objects", "mug", "jug"),
-        **environment,
-    )
-    out, err = job.communicate()
-    return job.returncode, out, err
-
-
-def _runs(folder):
+def _runs(folder, kind=None):
     store = client(f"sqlite:///{folder}/mlflow.db")
     experiment = store.get_experiment_by_name("tried")
-    return store, store.search_runs([experiment.experiment_id])
+    runs = store.search_runs([experiment.experiment_id])
+    return store, [run for run in runs if kind in (None, run.data.tags["kind"])]
+
+
+def _said(folder):
+    """Return what all runs say, without the ids that the store gives."""
+
+    def plain(run, parents):
+        tags = {
+            key: value
+            for key, value in run.data.tags.items()
+            if key not in ("mlflow.parentRunId", "mlflow.log-model.history")
+        }
+        parent = parents.get(run.data.tags.get("mlflow.parentRunId"))
+        inputs = sorted((item.dataset.name, item.dataset.digest) for item in run.inputs.dataset_inputs)
+        curves = [store.get_metric_history(run.info.run_id, key) for key in sorted(run.data.metrics)]
+        points = [
+            (point.key, point.step, point.value, point.timestamp) for curve in curves for point in curve
+        ]
+        times = run.info.start_time, run.info.end_time, run.info.status
+        models = [store.get_logged_model(item.model_id).name for item in run.outputs.model_outputs]
+        files = sorted(item.path for item in store.list_artifacts(run.info.run_id))
+        return (run.info.run_name, parent, tags, run.data.params, points, inputs, times, models, files)
+
+    store, runs = _runs(folder)
+    names = {run.info.run_id: run.info.run_name for run in runs}
+    return sorted((plain(run, names) for run in runs), key=lambda told: told[0])
 
 
 @pytest.fixture
-def call(tmp_path):
-    """Return a folder as a call of the workflow leaves it."""
-    for name in ("mug", "jug"):
-        (tmp_path / "raw" / name).mkdir(parents=True)
-        (tmp_path / "raw" / name / "scan.ply").write_text(name)
-    curve = {"experiment": "pouring", "split": "novel", "training_object": "mug", "draw": 0}
-    numbers = {"auc": 0.9, "tpr_at_fpr_00": 0.1, "tpr_at_fpr_01": 0.2, "tpr_at_fpr_05": 0.3, "brier": 0.05}
-    counts = {
-        "n_test": 5,
-        "n_positive": 2,
-        "n_iterations": 3,
-        "n_redrawn": 0,
-        "separable": False,
-        "converged": True,
-    }
-    rows = [
-        {**curve, **numbers, **counts, "features": features} for features in ("standard", "label_mapping")
-    ]
-    write_table(tmp_path / "processed/classify/pouring/scores.parquet", pd.DataFrame(rows), "scores")
-    (tmp_path / "reports").mkdir()
-    (tmp_path / "reports/roc.pdf").write_bytes(b"%PDF")
-    (tmp_path / "reports/metrics.json").write_text('{"simulate.pouring.leaked": 0}')
-    (tmp_path / "benchmarks/fuse").mkdir(parents=True)
-    (tmp_path / "benchmarks/fuse/mug.tsv").write_text("s\th:m:s\n2.5\t0:00:02\n")
-    (tmp_path / "config.json").write_text(json.dumps(CONFIG))
-    (tmp_path / "call.log").write_text("a log")
-    return tmp_path
+def again(tracked, tmp_path):
+    """Return a copy of the folder, whose store still has its artifacts where they were."""
+    return shutil.copytree(tracked, tmp_path / "again")
 
 
-def test_a_call_leaves_a_parent_run_and_one_run_a_feature_set(call):
-    code, out, err = _end(call, "success", time.time() - 60)
-    assert (code, out, err) == (0, "", "")
-    store, runs = _runs(call)
-    (parent,) = [run for run in runs if "mlflow.parentRunId" not in run.data.tags]
-    nested = {run.info.run_name: run for run in runs if run is not parent}
+def test_a_call_has_parameters_numbers_figures_and_data(tracked):
+    store, (parent,) = _runs(tracked, "call")
     assert parent.info.status == "FINISHED"
-    assert parent.data.params["classify.draws"] == "3"
+    assert parent.data.params["classify.draws"] == "2"
     assert parent.data.params["objects"] == "mug jug"
     assert len(parent.data.params["data.mug.sha256"]) == 64
     assert parent.data.metrics["simulate.pouring.leaked"] == 0
-    assert parent.data.metrics["seconds.fuse"] == 2.5
+    assert (parent.data.metrics["seconds.fuse"], parent.data.metrics["cpu_seconds.fuse"]) == (6.5, 3.0)
     assert parent.data.tags["git.commit"] == "unknown"
     assert {item.dataset.name for item in parent.inputs.dataset_inputs} == {"mug", "jug"}
-    artifacts = {artifact.path for artifact in store.list_artifacts(parent.info.run_id)}
-    assert artifacts == {"roc.pdf", "metrics.json", "config.json", "call.log"}
-    assert parent.info.artifact_uri.startswith((call / "mlartifacts").as_uri())
-    assert set(nested) == {"pouring standard", "pouring label_mapping"}
-    assert nested["pouring standard"].data.metrics["novel.auc"] == pytest.approx(0.9)
-    assert nested["pouring standard"].data.params["simulate.pouring.trials"] == "80"
-    assert nested["pouring standard"].data.tags["mlflow.parentRunId"] == parent.info.run_id
-
-
-def test_a_failed_call_is_recorded_without_the_results_of_an_earlier_one(call):
-    code, _, err = _end(call, "failed", time.time() + 60)
-    assert (code, err) == (0, "")
-    store, (parent,) = _runs(call)
-    assert parent.info.status == "FAILED"
-    assert not any(key.startswith("simulate.pouring.leaked") for key in parent.data.metrics)
-    assert {artifact.path for artifact in store.list_artifacts(parent.info.run_id)} == {
+    assert {item.path for item in store.list_artifacts(parent.info.run_id)} == {
+        "reports",
         "config.json",
         "call.log",
     }
+    figures = {item.path for item in store.list_artifacts(parent.info.run_id, "reports")}
+    assert figures == {"reports/roc.pdf", "reports/metrics.json", "reports/scans"}
+    assert parent.info.artifact_uri.startswith((tracked / "mlartifacts").as_uri())
+
+
+def test_stages_and_classifiers_are_nested(tracked):
+    _, (parent,) = _runs(tracked, "call")
+    _, stages = _runs(tracked, "stage")
+    _, classifiers = _runs(tracked, "classifier")
+    assert {run.data.tags["mlflow.parentRunId"] for run in stages + classifiers} == {parent.info.run_id}
+    assert [(run.info.run_name, run.data.metrics["jobs"]) for run in stages] == [("stage fuse", 2.0)]
+    assert {run.data.tags["training_object"] for run in classifiers} == set(OBJECTS)
+    assert len(classifiers) == 4
+    for run in classifiers:
+        assert len(run.outputs.model_outputs) == 1
+        assert {item.dataset.name for item in run.inputs.dataset_inputs} == {"pouring mug", "pouring jug"}
+
+
+def test_the_data_of_a_run_can_be_read_from_its_source(tracked):
+    import mlflow.data
+
+    _, (run, *_) = _runs(tracked, "classifier")
+    for item in run.inputs.dataset_inputs:
+        path = Path(mlflow.data.get_source(item.dataset).load())
+        assert path.read_bytes().startswith(b"PAR1")
+
+
+def test_a_lost_store_is_told_again_with_the_same_runs(again):
+    before = _said(again)
+    (again / "mlflow.db").unlink()
+    job = track(again, "again")
+    assert job.communicate() == ("1 calls recorded, 0 were there already\n", "")
+    assert _said(again) == before
+
+
+def test_a_call_that_is_there_is_not_told_twice(again):
+    before = _said(again)
+    job = track(again, "again")
+    assert job.communicate() == ("0 calls recorded, 1 were there already\n", "")
+    assert _said(again) == before
+
+
+def test_a_call_whose_writer_was_stopped_is_told_anew(again):
+    before = _said(again)
+    store, (parent,) = _runs(again, "call")
+    store.update_run(parent.info.run_id, status="RUNNING")
+    _, (stage,) = _runs(again, "stage")
+    store.delete_run(stage.info.run_id)
+    assert track(again, "again").communicate()[0] == "1 calls recorded, 0 were there already\n"
+    assert _said(again) == before
+
+
+def test_the_same_classifiers_are_no_runs_again(tmp_path):
+    folder = leave(tmp_path)
+    for _ in range(2):
+        assert end(folder, "success", time.time() - 60) == (0, "", "")
+    assert len(_runs(folder, "call")[1]) == 2
+    assert len(_runs(folder, "classifier")[1]) == 4
+
+
+def test_a_figure_that_has_changed_is_named_and_not_attached(again):
+    (again / "mlflow.db").unlink()
+    (again / "reports/roc.pdf").write_bytes(b"%PDF of another call")
+    track(again, "again").communicate()
+    store, (parent,) = _runs(again, "call")
+    assert parent.data.tags["changed_since"] == "reports/roc.pdf"
+    assert "reports/roc.pdf" not in {
+        item.path for item in store.list_artifacts(parent.info.run_id, "reports")
+    }
+
+
+FAILED = """\
+Error in rule fuse:
+    jobid: 1
+    log: logs/fuse/mug.log (check log file(s) for error details)
+Exiting because a job execution failed. Look above for error messages
+"""
+
+
+def test_a_failed_call_has_the_rule_its_log_and_no_result_of_an_earlier_one(tmp_path):
+    folder = leave(tmp_path)
+    (folder / "logs/fuse").mkdir(parents=True)
+    (folder / "logs/fuse/mug.log").write_text("error: data/raw/mug: expected x, found y\n")
+    (folder / "call.log").write_text(FAILED)
+    assert end(folder, "failed", time.time() + 60) == (0, "", "")
+    store, (parent,) = _runs(folder, "call")
+    assert parent.info.status == "FAILED"
+    assert parent.data.tags["failed.rule"] == "fuse"
+    assert "found y" in parent.data.tags["mlflow.note.content"]
+    assert "simulate.pouring.leaked" not in parent.data.metrics
+    assert [run.info.status for run in _runs(folder, "stage")[1]] == ["FAILED"]
+    assert _runs(folder, "classifier")[1] == []
+    logs = store.list_artifacts(parent.info.run_id, "failed/logs/fuse")
+    assert [item.path for item in logs] == ["failed/logs/fuse/mug.log"]
 
 
 @pytest.mark.parametrize("uri", ["nonsense://nowhere", "http://127.0.0.1:9"])
-def test_a_store_that_cannot_be_reached_costs_one_warning(call, uri):
-    begun_s = time.monotonic()
-    code, out, err = _end(call, "success", time.time() - 60, MLFLOW_TRACKING_URI=uri)
+def test_a_store_that_cannot_be_reached_costs_one_warning_and_is_told_later(tmp_path, uri):
+    folder = leave(tmp_path)
+    code, out, err = end(folder, "success", time.time() - 60, MLFLOW_TRACKING_URI=uri)
     assert (code, out) == (0, "")
     assert err.startswith("warning: track: expected to record this call in MLflow")
     assert len(err.splitlines()) == 1
-    assert time.monotonic() - begun_s < 60
+    if uri.startswith("nonsense"):
+        job = track(folder, "again", MLFLOW_TRACKING_URI=uri)
+        assert job.communicate()[1].startswith(f"error: {uri}: expected a store of MLflow, found")
+        assert job.returncode == 1
+        assert track(folder, "again").communicate()[0] == "1 calls recorded, 0 were there already\n"
+
+
+def test_nothing_to_tell_again_is_said(tmp_path):
+    job = track(tmp_path, "again")
+    assert job.communicate()[1].startswith(
+        "error: logs/track/calls: expected the records of earlier calls, found none"
+    )
+    assert job.returncode == 1
 
 
 def test_stores_prepared_at_the_same_time_are_whole(tmp_path):
-    jobs = [_track(tmp_path, "start") for _ in range(3)]
+    jobs = [track(tmp_path, "start") for _ in range(3)]
     assert [job.communicate()[1] for job in jobs] == ["", "", ""]
     assert os.listdir(tmp_path) == ["mlflow.db"]
     assert client(f"sqlite:///{tmp_path}/mlflow.db").create_experiment("another")

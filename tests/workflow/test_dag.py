@@ -244,7 +244,11 @@ def test_a_broken_object_costs_itself_alone(project):
     assert (project / "data/processed/simulate/pouring/wide_bowl/trials.parquet").is_file()
     assert not (project / "data/processed/fuse/broken_cup/mesh.ply").exists()
     assert not (project / "reports/roc.pdf").exists()
-    assert [run.info.status for run in _runs(project)].count("FAILED") == 1
+    failed = {run.data.tags["kind"]: run for run in _runs(project) if run.info.status == "FAILED"}
+    assert set(failed) == {"call", "stage"}
+    assert failed["stage"].data.tags["stage"] == "fuse"
+    assert failed["call"].data.tags["failed.rule"] == "fuse"
+    assert failed["call"].data.tags["failed.reason"] == said
 
     project.configure("objects.exclude", ["broken_cup"])
     assert "fuse broken_cup" not in project.planned()

@@ -1,5 +1,5 @@
 # Needs what a call of Snakemake left behind: outputs, benchmarks, Snakemake's own log.
-# Makes the call's runs in MLflow (default: mlflow.db, mlartifacts/), and no file that a rule could depend on.
+# Makes the call's runs in MLflow (default: mlflow.db, mlartifacts/) and logs/track/calls/, what was said of each call; no rule depends on them.
 # How: called by the Snakefile's handlers, once before the first job and once after the last; it never fails a call.
 
 import json

@@ -1,4 +1,4 @@
-"""Pour with your own objects: annotate one, look at what the pipeline made of it.
+"""Pour with your own objects: add one, annotate one, look at what the pipeline made of it, ask what it learnt.
 
 Works on the project in the folder where it is called (or --project) and on what `snakemake` has made there.
 """
@@ -11,11 +11,11 @@ from pathlib import Path
 from types import ModuleType
 
 from pipeline import command
-from pipeline.pour import annotate, view
+from pipeline.pour import add, annotate, predict, show, view
 
 # A subcommand is a module of its name with a docstring (its help), `options(parser)`, `call(options) -> dict` (numbers,
 # texts, lists: what --json writes) and `text(result) -> str` (what is written otherwise). Add it here and nowhere else.
-SUBCOMMANDS = (annotate, view)
+SUBCOMMANDS = (add, annotate, view, show, predict)
 EXIT_CODES = "exit codes: 0 done; 1 something in your files or names is wrong (one sentence says what); 2 wrong options"
 
 
@@ -61,6 +61,9 @@ def _add(subcommands: "argparse._SubParsersAction[argparse.ArgumentParser]", mod
 
 class _Help(argparse.ArgumentDefaultsHelpFormatter, argparse.RawDescriptionHelpFormatter):
     """Docstrings as they are written, and defaults."""
+
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        return action.help if action.default in (None, False) else super()._get_help_string(action)
 
 
 def script() -> None:

@@ -1,24 +1,38 @@
-"""Record a call of the workflow in MLflow: `start` prepares the store, `end` writes the runs. Neither ever fails the call."""
+"""Record calls of the workflow in MLflow: `start` prepares the store, `end` writes a call, `again` all calls that it lacks.
+
+`start` and `end` are called by the workflow and never fail it. `again` is for a store that was lost or could not be reached.
+"""
 
 import argparse
+import sys
 import time
-from datetime import datetime
 from pathlib import Path
 
-from pipeline.command import parser, say
-from pipeline.track import facts
+from pipeline.command import parser, run, say
+from pipeline.errors import PipelineError
 
 
 def main() -> None:
-    """Do what the command line says; a mistake becomes one warning."""
+    """Do what the command line says; only `again` can fail."""
     arguments = _arguments()
+    if arguments.do is _again:
+        run(lambda: _again(arguments))
+        return
     try:
         arguments.do(arguments)
     except Exception as error:  # whatever the store throws, the results are there
-        reason = " ".join(str(error).split())[:300] or type(error).__name__
         say(
-            f"warning: track: expected to record this call in MLflow, found: {reason}; the results are not affected"
+            f"warning: track: expected to record this call in MLflow, found: {_reason(error)}; {_CONSOLATION}"
         )
+
+
+_CONSOLATION = (
+    "the results are not affected; `python -m pipeline.track again` records it when the store is back"
+)
+
+
+def _reason(error: Exception) -> str:
+    return " ".join(str(error).split())[:300] or type(error).__name__
 
 
 def _arguments() -> argparse.Namespace:
@@ -35,6 +49,8 @@ def _arguments() -> argparse.Namespace:
         end.add_argument(f"--{name}", required=True, help=f"the folder {name}")
     end.add_argument("--objects", nargs="+", required=True, help="the objects that take part")
     end.set_defaults(do=_end)
+    again = commands.add_parser("again", help="record the calls of logs/track/calls that the store lacks")
+    again.set_defaults(do=_again)
     return options.parse_args()
 
 
@@ -46,60 +62,47 @@ def _start(_: argparse.Namespace) -> None:
 
 def _end(arguments: argparse.Namespace) -> None:
     from pipeline.artefacts import read_json
+    from pipeline.track import ledger
+    from pipeline.track.call import Call, call_run
+
+    folders = {name: getattr(arguments, name) for name in ("raw", "processed", "reports", "benchmarks")}
+    call = Call(
+        status=arguments.status,
+        since_s=arguments.since,
+        until_s=time.time(),
+        logs=tuple(arguments.log),
+        config=read_json(arguments.config),
+        objects=tuple(arguments.objects),
+        **folders,
+    )
+    written = call_run(call)
+    ledger.keep(written)
     from pipeline.track.store import Recorder, prepare
 
     prepare()
-    config = read_json(arguments.config)
-    recorder = Recorder(config["track"]["experiment"])
-    status = "FINISHED" if arguments.status == "success" else "FAILED"
-    commit = facts.commit()
-    begun = datetime.fromtimestamp(arguments.since).strftime("%Y-%m-%d %H:%M:%S")
-    parent = recorder.run(
-        f"call {begun}", start_s=arguments.since, tags={**commit, "status": arguments.status}
-    )
+    Recorder(call.config["track"]["experiment"]).call(written)
+
+
+def _again(_: argparse.Namespace) -> None:
+    from pipeline.track import ledger
+
+    if not ledger.kept():
+        raise PipelineError(
+            f"{ledger.CALLS}: expected the records of earlier calls, found none; run the workflow in {Path.cwd()} first"
+        )
+    from pipeline.track.store import Recorder, prepare, tracking_uri
+
     try:
-        _record_call(recorder, parent, arguments, config)
-        _record_experiments(recorder, parent, arguments, facts.flatten(config), commit)
-        recorder.end(parent, status)
-    except BaseException:
-        recorder.end(parent, "FAILED")
+        prepare()
+        written = [Recorder(call.params["track.experiment"]).call(call) for call in ledger.calls()]
+    except PipelineError:
         raise
-
-
-def _record_call(recorder, parent: str, arguments: argparse.Namespace, config: dict) -> None:
-    digests = {name: facts.digest(Path(arguments.raw) / name) for name in arguments.objects}
-    spent = facts.seconds(arguments.benchmarks, arguments.since)
-    metrics = facts.headline(arguments.reports, arguments.since)
-    metrics |= {f"seconds.{stage}": value for stage, value in spent.items()}
-    metrics["seconds.call"] = time.time() - arguments.since
-    params = facts.flatten(config) | {"objects": " ".join(arguments.objects)}
-    params |= {f"data.{name}.sha256": value for name, value in digests.items()}
-    recorder.record(parent, params=params, metrics=metrics)
-    recorder.inputs(parent, digests, arguments.raw)
-    figures = [Path(arguments.reports) / name for name in ("roc.pdf", "metrics.json")]
-    made = [path for path in figures if facts.made(path, arguments.since)]
-    recorder.files(parent, *made, arguments.config, *arguments.log)
-
-
-def _record_experiments(
-    recorder, parent: str, arguments: argparse.Namespace, config: dict, commit: dict
-) -> None:
-    for experiment, scores in facts.experiments(
-        arguments.processed, arguments.reports, arguments.since
-    ).items():
-        used = {
-            key: value
-            for key, value in config.items()
-            if key.startswith(("classify.", f"simulate.{experiment}."))
-        }
-        for features, metrics in facts.score_means(scores).items():
-            name = f"{experiment} {features}"
-            tags = {**commit, "experiment": experiment, "features": features}
-            run = recorder.run(name, parent=parent, start_s=arguments.since, tags=tags)
-            recorder.record(
-                run, params={"experiment": experiment, "features": features, **used}, metrics=metrics
-            )
-            recorder.end(run, "FINISHED")
+    except Exception as error:
+        raise PipelineError(
+            f"{tracking_uri()}: expected a store of MLflow, found: {_reason(error)}; "
+            "start it, or set MLFLOW_TRACKING_URI"
+        ) from error
+    sys.stdout.write(f"{sum(written)} calls recorded, {len(written) - sum(written)} were there already\n")
 
 
 if __name__ == "__main__":

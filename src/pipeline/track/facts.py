@@ -1,16 +1,17 @@
 """What there is to record about a call of the workflow: read from its files, knows nothing of MLflow."""
 
-import csv
+import getpass
 import hashlib
 import os
+import socket
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from pipeline.artefacts import read_json, read_table
+from pipeline.artefacts import read_json
 
-SCORES = ("auc", "tpr_at_fpr_00", "tpr_at_fpr_01", "tpr_at_fpr_05", "brier")
+FIGURES = (".pdf", ".png", ".svg", ".html", ".json", ".gif", ".mp4")
 
 
 def flatten(tree: dict, prefix: str = "") -> dict[str, Any]:
@@ -25,12 +26,17 @@ def flatten(tree: dict, prefix: str = "") -> dict[str, Any]:
     return flat
 
 
+def sha256(path: str | Path) -> str:
+    """Return the SHA-256 of a file."""
+    with Path(path).open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
 def digest(folder: str | Path) -> str:
     """Return the SHA-256 over names and contents of all files below `folder`; hidden ones are left out."""
     total = hashlib.sha256()
     for path in sorted(_files(Path(folder))):
-        content = hashlib.sha256(path.read_bytes()).hexdigest()
-        total.update(f"{path.relative_to(folder).as_posix()} {content}\n".encode())
+        total.update(f"{path.relative_to(folder).as_posix()} {sha256(path)}\n".encode())
     return total.hexdigest()
 
 
@@ -53,41 +59,27 @@ def _git(*arguments: str) -> str:
     return subprocess.run(["git", *arguments], capture_output=True, text=True, check=True).stdout.strip()
 
 
+def who() -> dict[str, str]:
+    """Return who called and from which folder of which machine (`user`, `workspace`)."""
+    try:
+        user = getpass.getuser()
+    except (OSError, KeyError):  # a user without a name, as in containers
+        user = str(os.getuid())
+    return {"user": user, "workspace": f"{socket.gethostname()}:{Path.cwd()}"}
+
+
 def made(path: str | Path, since_s: float) -> bool:
     """Return whether the file is there and was written at or after `since_s` (seconds since 1970)."""
     return Path(path).is_file() and Path(path).stat().st_mtime >= since_s
 
 
-def seconds(benchmarks: str | Path, since_s: float) -> dict[str, float]:
-    """Return wall time a stage in seconds, summed over the jobs that ran since `since_s`."""
-    totals: dict[str, float] = {}
-    for path in sorted(Path(benchmarks).glob("*/**/*.tsv")):
-        if made(path, since_s):
-            stage = path.relative_to(benchmarks).parts[0]
-            with path.open() as file:
-                spent_s = sum(float(row["s"]) for row in csv.DictReader(file, delimiter="\t"))
-            totals[stage] = totals.get(stage, 0.0) + spent_s
-    return totals
-
-
-def experiments(processed: str | Path, reports: str | Path, since_s: float) -> dict[str, Path]:
-    """Return the scores that this call made or, as it made the report from them, found up to date: experiment → file."""
-    reported = made(Path(reports) / "roc.pdf", since_s)
-    scores = sorted((Path(processed) / "classify").glob("*/scores.parquet"))
-    return {path.parent.name: path for path in scores if reported or made(path, since_s)}
-
-
-def score_means(scores: str | Path) -> dict[str, dict[str, float]]:
-    """Return features → {`same.auc`, `novel.auc`, …}: means over draws, then over training objects; no undefined ones."""
-    table = read_table(scores, "scores")
-    by_object = table.groupby(["features", "split", "training_object"], observed=True)[list(SCORES)].mean()
-    means = by_object.groupby(["features", "split"]).mean()
-    found: dict[str, dict[str, float]] = {}
-    for (features, split), row in means.iterrows():
-        found.setdefault(str(features), {}).update(
-            {f"{split}.{name}": float(value) for name, value in row.items() if value == value}
-        )
-    return found
+def reported(reports: str | Path, since_s: float) -> list[Path]:
+    """Return the figures, pages and numbers below `reports` that this call made."""
+    return [
+        path
+        for path in sorted(_files(Path(reports)))
+        if path.suffix in FIGURES and path.stat().st_mtime >= since_s
+    ]
 
 
 def headline(reports: str | Path, since_s: float) -> dict[str, float]:
