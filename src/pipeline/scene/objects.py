@@ -50,4 +50,5 @@ def _cavity(name: str, processed: Path, mesh: Mesh) -> Cavity:
         return cavity(*mesh, name=name)
     found = read_arrays(path)
     arrays = {part.name: found[f"cavity_{part.name}"] for part in fields(Cavity)}
-    return Cavity(**{key: value if value.ndim else value.item() for key, value in arrays.items()})
+    values: Any = {key: value if value.ndim else value.item() for key, value in arrays.items()}
+    return Cavity(**values)

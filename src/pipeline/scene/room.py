@@ -12,7 +12,7 @@ LAYERS, SECTORS, CONTOUR = 40, 64, 64
 
 def room(cup: Cavity) -> dict[str, Any]:
     """Return the part of the viewer's object that tells of a cavity: rim, opening, lip, radii (layers × sectors, from below)."""
-    layers = cup.interior.any(axis=(0, 1)).nonzero()[0]
+    layers = np.flatnonzero(cup.interior.any(axis=(0, 1)))
     bottom, top = _floor_m(cup, int(layers[0])), float(cup.rim_m[:, 2].max())
     radii = radii_m(cup, bottom, top)
     reach = float(radii.max())

@@ -38,7 +38,7 @@ void main() {
   float key = max(dot(normal, normalize(vec3(-0.45, 0.75, 0.6))), 0.0);
   float fill = 0.5 + 0.5 * normal.y;
   float shine = pow(max(dot(reflect(-to_eye, normal), normalize(vec3(-0.45, 0.75, 0.6))), 0.0), 40.0);
-  vec3 lit = base * (0.42 + 0.22 * fill + 0.42 * key + 0.10 * facing) + 0.16 * shine;
+  vec3 lit = base * (0.54 + 0.2 * fill + 0.34 * key + 0.08 * facing) + 0.16 * shine;
   float alpha = mix(u_alpha, min(1.0, u_alpha * 2.6), (1.0 - facing) * (1.0 - facing));
   alpha = max(alpha, u_parts * edge(v_parts.y) * min(1.0, 2.0 * u_alpha));
   colour = vec4(lit * alpha, alpha);
@@ -50,7 +50,7 @@ uniform float u_far;
 in vec3 v_eye;
 out vec4 colour;
 void main() {
-  vec3 digits = fract(clamp(length(v_eye) / u_far, 0.0, 0.999999) * vec3(1.0, 255.0, 65025.0));
+  vec3 digits = fract(clamp(-v_eye.z / u_far, 0.0, 0.999999) * vec3(1.0, 255.0, 65025.0));
   colour = vec4(digits - digits.yzz * vec3(1.0 / 255.0, 1.0 / 255.0, 0.0), 1.0);
 }`;
 
@@ -81,6 +81,10 @@ const Mat = {
   perspective(fov, aspect, near, far) {
     const f = 1 / Math.tan(fov / 2), d = 1 / (near - far);
     return new Float32Array([f / aspect, 0, 0, 0, 0, f, 0, 0, 0, 0, (far + near) * d, -1, 0, 0, 2 * far * near * d, 0]);
+  },
+  parallel(height, aspect, near, far) {
+    const d = 1 / (near - far);
+    return new Float32Array([1 / (height * aspect), 0, 0, 0, 0, 1 / height, 0, 0, 0, 0, 2 * d, 0, 0, 0, (far + near) * d, 1]);
   },
   lookAt(eye, target, up) {
     const z = Vec.unit(Vec.sub(eye, target)), x = Vec.unit(Vec.cross(up, z)), y = Vec.cross(z, x);
@@ -152,7 +156,7 @@ class Viewer {
     this.surface = this.program(SURFACE_VERTEX, SURFACE_FRAGMENT);
     this.azimuth = 0.7; this.elevation = 0.55; this.zoom = 1;
     this.model = Mat.identity();
-    this.glass = false; this.coloured = true; this.marked = true;
+    this.parallel = false; this.glass = false; this.coloured = true; this.marked = true;
     this.things = []; this.liquid = null;
     canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
     new ResizeObserver(() => this.draw()).observe(canvas);
@@ -254,8 +258,9 @@ class Viewer {
     const away = [c * Math.cos(this.azimuth), c * Math.sin(this.azimuth), Math.sin(this.elevation)];
     const eye = Vec.add(target, Vec.mul(away, distance));
     const view = Mat.lookAt(eye, target, [0, 0, 1]);
-    const projection = Mat.perspective(fov, aspect, Math.max(distance - 3 * radius, distance / 50), distance + 3 * radius);
-    return { eye, view, projection, far: distance + 3 * radius };
+    const near = Math.max(distance - 3 * radius, distance / 50), far = distance + 3 * radius;
+    const projection = this.parallel ? Mat.parallel(distance * Math.tan(fov / 2), aspect, near, far) : Mat.perspective(fov, aspect, near, far);
+    return { eye, view, projection, far };
   }
 
   fit() {
@@ -313,7 +318,7 @@ class Viewer {
   /** Where points (flat, object frame) are on the canvas, in CSS pixels, and which of them nothing hides. */
   project(points, tolerance = 0.0015) {
     this.fit();
-    const { eye, view, projection, far } = this.camera(), both = Mat.multiply(projection, view);
+    const { view, projection, far } = this.camera(), both = Mat.multiply(projection, view);
     const depth = this.depths(view, projection, far), { width, height, clientWidth, clientHeight } = this.canvas;
     const n = points.length / 3, x = new Float32Array(n), y = new Float32Array(n), visible = new Uint8Array(n);
     for (let i = 0; i < n; i++) {
@@ -322,7 +327,7 @@ class Viewer {
       x[i] = u * clientWidth; y[i] = (1 - v) * clientHeight;
       const column = Math.floor(u * width), row = Math.floor(v * height);
       if (column < 0 || row < 0 || column >= width || row >= height) continue;
-      visible[i] = Math.hypot(...Vec.sub(p, eye)) <= depth(column, row) + tolerance;
+      visible[i] = -Mat.apply(view, p)[2] <= depth(column, row) + tolerance;
     }
     return { x, y, visible };
   }
