@@ -17,6 +17,7 @@ rule all:
         "reports/metrics.json",
         "reports/labels.pdf",
         each("reports/scans/{object}.png"),
+        "reports/index.html",
 
 
 include: "workflow/rules/scan.smk"

@@ -1,7 +1,7 @@
 # Needs the curves and scores of both experiments; for the numbers also what every stage made, and the demonstration objects' truth.
 # Makes report/accuracy/<object>.json, a demonstration object's errors against its truth.
 # Makes reports/roc.pdf (the paper's Fig. 3) with reports/metrics.json (every headline number), and reports/labels.pdf (Fig. 2);
-#       reports/scans/<object>.png, a page on each scan;
+#       reports/scans/<object>.png, a page on each scan; reports/index.html, all of this on one page for a browser;
 #       when asked for, reports/physics.pdf and reports/physics.json, the liquid against hydrostatics and against Bullet's spheres.
 # How: one module a figure; truth is compared here and nowhere else.
 
@@ -122,3 +122,43 @@ rule report_physics:
     shell:
         "python -m pipeline.report.physics --measurements {input.measurements:q} --trials {input.trials:q}"
         " --other-trials {params.others} --page {output.page:q} --numbers {output.numbers:q} {params.options} > {log:q} 2>&1"
+
+
+# What index.html shows: a line each for a figure (its words are in pipeline.report.index.figures) and for its numbers.
+INDEX_FIGURES = [
+    rules.report.output.roc,
+    rules.draw_labels.output.figure,
+]
+INDEX_NUMBERS = [
+    rules.report.output.metrics,
+]
+
+
+rule index:
+    input:
+        figures=INDEX_FIGURES,
+        numbers=INDEX_NUMBERS,
+        scans=each(rules.draw_scan.output.page),
+        mesh=each(rules.fuse.output.mesh),
+        fusion=each(rules.fuse.output.report),
+        labels=each(rules.warp.output.label),
+        containers=each(rules.simulate_container.output.container),
+        parameters=rules.assemble_parameters.output[0],
+    output:
+        page=f"{REPORTS}/index.html",
+    log:
+        "logs/report/index.log",
+    threads: 1
+    params:
+        processed=PROCESSED,
+        source=SOURCE,
+        objects=" ".join(OBJECTS),
+        simulate=options("simulate", "engine", "spacing_m"),
+        classify=options("classify", "samples", "draws"),
+        track=options("track", "experiment"),
+        server=os.environ.get("MLFLOW_TRACKING_URI", ""),
+        code=code("pipeline.report.index"),
+    shell:
+        "python -m pipeline.report.index --processed {params.processed:q} --source {params.source} --objects {params.objects}"
+        " --numbers {input.numbers:q} --figures {input.figures:q} --scans {input.scans:q} {params.simulate} {params.classify}"
+        " {params.track} --server={params.server:q} --output {output.page:q} > {log:q} 2>&1"
