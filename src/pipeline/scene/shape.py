@@ -43,7 +43,7 @@ def thinned(mesh: Mesh, triangles: int = TRIANGLES, longest_m: float = LONGEST_E
     import open3d as o3d
 
     full = o3d.geometry.TriangleMesh(
-        o3d.utility.Vector3dVector(mesh[0]), o3d.utility.Vector3iVector(mesh[1].astype(np.int32))
+        o3d.utility.Vector3dVector(np.array(mesh[0])), o3d.utility.Vector3iVector(mesh[1].astype(np.int32))
     )
     few = full.simplify_quadric_decimation(triangles) if len(mesh[1]) > triangles else full
     return subdivided(np.asarray(few.vertices), np.asarray(few.triangles, dtype=np.int64), longest_m)

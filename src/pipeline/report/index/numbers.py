@@ -55,7 +55,7 @@ def headlines(numbers: Numbers) -> list[dict[str, str]]:
     if rate is not None:
         standard = numbers.get("classify.pouring.standard.novel.tpr_at_fpr_01")
         against = f"{standard:.0%} by standard features" if standard is not None else ""
-        found.append(_headline(f"{rate:.0%}", "of the true pours found at 1 % false ones", against))
+        found.append(_headline(f"{rate:.0%}", "of the true pours found at 1\u00a0% false ones", against))
     trials = sum(numbers.get(f"simulate.{name}.trials", 0) for name in EXPERIMENTS)
     leaked = sum(numbers.get(f"simulate.{name}.leaked", 0) for name in EXPERIMENTS)
     if trials:

@@ -78,6 +78,7 @@ async function drawThumbnails(objects, canvasOf) {
   const viewer = new Viewer(hidden);
   viewer.fit = () => {};
   viewer.marked = false;
+  viewer.zoom = 0.8;
   for (const object of objects) {
     const canvas = canvasOf(object.name);
     if (!canvas) continue;
