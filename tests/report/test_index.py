@@ -83,7 +83,6 @@ def page(folder):
         "spacing-m": 0.01,
         "samples": 50,
         "draws": 20,
-        "experiment": "warped-pouring",
         "source": "mug",
     }
     files = {
@@ -240,11 +239,11 @@ def test_a_scan_without_views_is_told_as_what_it_is():
     assert told == {"kind": "mesh", "seen": "–", "median": "–", "closed": "not closed"}
 
 
-def test_links_lead_to_the_runs():
-    assert runs("warped-pouring", "")[0][1].endswith("/#/experiments/1?workflowType=machine_learning")
-    assert runs("warped-pouring", "http://mlflow.lab:5000/")[0][1].startswith(
-        "http://mlflow.lab:5000/#/experiments"
-    )
+def test_links_lead_to_the_runs_and_name_what_they_show():
+    assert [name for name, _ in runs()] == ["all runs", "pouring", "filling"]
+    for _, address in runs():
+        assert address.startswith("http://127.0.0.1:5000/#/experiments/1?workflowType=machine_learning")
+    assert "pouring" in runs()[1][1]
 
 
 def test_every_page_of_a_figure_is_an_image_and_a_broken_one_is_named(folder, tmp_path):

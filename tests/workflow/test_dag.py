@@ -10,7 +10,7 @@ from pipeline.track.store import client
 
 OBJECTS = {"mug", "short_cup", "wide_bowl"}
 ASSEMBLED = {"assemble_parameters", "assemble_tilt_references"}
-CLASSIFIED = {"classify pouring", "classify filling", "report"}
+CLASSIFIED = {"classify pouring", "classify filling", "report", "index"}
 
 
 def _each(rule: str, objects=frozenset(OBJECTS)) -> set[str]:
@@ -89,12 +89,20 @@ def test_one_core_gives_the_same_bytes_as_two(finished, unfinished):
         ("simulate.engine", "bullet", SIMULATED),
         ("simulate.device", "cuda", SIMULATED),
         ("simulate.physics.convergence_trials", 3, set()),
-        ("simulate.pouring.tilt_max_deg", 90.0, _each("simulate_pouring") | {"classify pouring", "report"}),
-        ("simulate.filling.tilt_deg", 90.0, _each("simulate_filling") | {"classify filling", "report"}),
+        (
+            "simulate.pouring.tilt_max_deg",
+            90.0,
+            _each("simulate_pouring") | {"classify pouring", "report", "index"},
+        ),
+        (
+            "simulate.filling.tilt_deg",
+            90.0,
+            _each("simulate_filling") | {"classify filling", "report", "index"},
+        ),
         (
             "simulate.filling.held_objects",
             ["short_cup", "mug"],
-            _each("simulate_filling") | {"classify filling", "report"},
+            _each("simulate_filling") | {"classify filling", "report", "index"},
         ),
         ("classify.draws", 4, CLASSIFIED),
         ("track.experiment", "another", set()),
@@ -133,7 +141,7 @@ def test_two_keys_that_swap_their_values_are_a_change(project):
         ("simulate/trials.py", SIMULATED),
         ("simulate/fields.py", CONTAINED),
         ("classify/regression.py", CLASSIFIED),
-        ("report/roc.py", {"report"}),
+        ("report/roc.py", {"report", "index"}),
         ("track/store.py", set()),
         ("workflow/objects.py", set()),
     ],

@@ -155,10 +155,8 @@ rule index:
         objects=" ".join(OBJECTS),
         simulate=options("simulate", "engine", "spacing_m"),
         classify=options("classify", "samples", "draws"),
-        track=options("track", "experiment"),
-        server=os.environ.get("MLFLOW_TRACKING_URI", ""),
         code=code("pipeline.report.index"),
     shell:
         "python -m pipeline.report.index --processed {params.processed:q} --source {params.source} --objects {params.objects}"
         " --numbers {input.numbers:q} --figures {input.figures:q} --scans {input.scans:q} {params.simulate} {params.classify}"
-        " {params.track} --server={params.server:q} --output {output.page:q} > {log:q} 2>&1"
+        " --output {output.page:q} > {log:q} 2>&1"

@@ -17,8 +17,6 @@ def main() -> None:
     parser.add_argument("--figures", type=Path, nargs="*", default=[], help="PDF files, in the page's order")
     parser.add_argument("--scans", type=Path, nargs="*", default=[], help="pages on the objects' scans, PNG")
     parser.add_argument("--uncertainties", type=Path, help="table of the parameters' uncertainties")
-    parser.add_argument("--experiment", required=True, help="name of the experiment in MLflow")
-    parser.add_argument("--server", default="", help="MLflow's server, if the runs are on one")
     for option in ("engine", "spacing-m", "samples", "draws"):
         parser.add_argument(f"--{option}", required=True, help="as configured")
     parser.add_argument("--output", type=Path, required=True)
@@ -43,7 +41,7 @@ def main() -> None:
         objects=[described(name, options.processed, options.source) for name in names],
         source=options.source,
         settings=settings(options, numbers),
-        runs=runs(options.experiment, options.server),
+        runs=runs(),
     )
     with replacing(options.output) as temporary:
         temporary.write_text(html)

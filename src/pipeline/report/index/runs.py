@@ -3,9 +3,8 @@
 import argparse
 from urllib.parse import quote
 
-LOCAL = "http://127.0.0.1:5000"
-# The first experiment that a new store is given; 0 is MLflow's own.
-LOCAL_EXPERIMENT = "1"
+# Where MLflow's page is by itself; 1 is the first experiment that a new store is given, 0 is MLflow's own.
+ADDRESS = "http://127.0.0.1:5000/#/experiments/1?workflowType=machine_learning"
 
 
 def settings(options: argparse.Namespace, numbers: dict[str, float]) -> list[tuple[str, str]]:
@@ -21,17 +20,14 @@ def settings(options: argparse.Namespace, numbers: dict[str, float]) -> list[tup
     ]
 
 
-def runs(experiment: str, server: str) -> list[tuple[str, str]]:
-    """Return names and addresses of the runs, all of them and those of each experiment."""
+def runs() -> list[tuple[str, str]]:
+    """Return names and addresses of the runs, all of them and those of each experiment, where MLflow shows them."""
     filters = {
         "all runs": "",
         "pouring": "tags.experiment = 'pouring'",
         "filling": "tags.experiment = 'filling'",
     }
-    if server.startswith("http"):
-        # The server numbers its experiments itself.
-        return [("all experiments", f"{server.rstrip('/')}/#/experiments?searchFilter={quote(experiment)}")]
-    base = f"{LOCAL}/#/experiments/{LOCAL_EXPERIMENT}?workflowType=machine_learning"
     return [
-        (name, base + (f"&searchFilter={quote(words)}" if words else "")) for name, words in filters.items()
+        (name, ADDRESS + (f"&searchFilter={quote(words)}" if words else ""))
+        for name, words in filters.items()
     ]
