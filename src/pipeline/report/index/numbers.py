@@ -96,7 +96,7 @@ def claims(numbers: Numbers) -> list[dict[str, Any]]:
     return [
         {
             "words": words,
-            "number": said.format(numbers[f"claims.{name}"]),
+            "number": said.format(numbers[f"claims.{name}"]).replace("-", "−"),
             "holds": bool(numbers[f"claims.{name}.holds"]),
         }
         for name, (words, said) in CLAIMS.items()
