@@ -64,7 +64,7 @@ def _parameter(key: str, value: float, std: float | None) -> dict[str, str]:
     return {
         "heading": heading,
         "unit": unit,
-        "value": f"{value * scale:.{decimals}f}",
+        "value": f"{value * scale:.{decimals}f}" if math.isfinite(value) else "–",
         "std": f"{std * scale:.{min(digits, 3)}f}" if known and std is not None else "",
     }
 
