@@ -20,6 +20,7 @@ rule all:
         "reports/evaluation.pdf",
         each("reports/scans/{object}.png"),
         expand(f"{PROCESSED}/parametrise/{{source}}/parameters.parquet", source=FURTHER_SOURCES),
+        "reports/index.html",
 
 
 include: "workflow/rules/scan.smk"

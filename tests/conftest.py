@@ -4,6 +4,8 @@ from functools import cache
 
 import numpy as np
 import pandas as pd
+import pytest
+from browser import chromium
 
 from pipeline.geometry.sampling import even_points, triangle_areas_and_normals
 from pipeline.scan.shapes import shape
@@ -24,3 +26,10 @@ def sampled(name: str, n: int = 6000, noise_m: float = 0.0001) -> pd.DataFrame:
     truth = {part: parts[part] for part in PARTS}
     probabilities = {f"p_{part}": parts[part].astype(float) for part in PARTS}
     return frame.assign(area_m2=areas.sum() / len(points), seen=True, **probabilities, **truth)
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """Headless Chromium."""
+    with chromium() as started:
+        yield started

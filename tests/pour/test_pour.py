@@ -1,27 +1,12 @@
 """The command line: help, exit codes, names that are nearly right."""
 
 import subprocess
-import sys
 
 import pytest
-import yaml
+from pour.served import command
 
 from pipeline.errors import PipelineError
 from pipeline.pour.__main__ import SUBCOMMANDS, main
-from pipeline.pour.project import Project
-
-
-@pytest.fixture
-def project(tmp_path):
-    (tmp_path / "config").mkdir()
-    for name in ("mug", "jug"):
-        (tmp_path / "data/raw" / name).mkdir(parents=True)
-    config = {
-        "objects": {"source": "mug", "exclude": ["old_cup"]},
-        "scan": {"objects": ["tall_cup", "old_cup"]},
-    }
-    (tmp_path / "config/config.yaml").write_text(yaml.safe_dump(config))
-    return Project(tmp_path)
 
 
 def test_objects_are_those_of_the_configuration_and_of_data_raw(project):
@@ -35,8 +20,8 @@ def test_a_misspelt_object_is_refused_with_the_nearest_name(project):
 
 
 def test_what_is_not_made_yet_says_how_it_is_made(project):
-    with pytest.raises(PipelineError, match=r"run: snakemake -c2 data/processed/fuse/mug/mesh\.ply"):
-        project.made("fuse/mug/mesh.ply")
+    with pytest.raises(PipelineError, match=r"run: snakemake -c2 data/processed/fuse/jug/mesh\.ply"):
+        project.made("fuse/jug/mesh.ply")
 
 
 def test_help_names_every_subcommand(capsys):
@@ -54,8 +39,7 @@ def test_help_names_every_subcommand(capsys):
 
 def test_exit_codes_and_where_words_go(project):
     def call(*arguments):
-        command = [sys.executable, "-m", "pipeline.pour", *arguments, "--project", project.folder]
-        return subprocess.run(command, capture_output=True, text=True)
+        return subprocess.run(command(project, *arguments), capture_output=True, text=True)
 
     wrong_name = call("view", "tal_cup", "--json")
     assert (wrong_name.returncode, wrong_name.stdout) == (1, "")

@@ -81,3 +81,12 @@ def test_mlflow_is_imported_by_track_alone():
         if "mlflow" in path.read_text().replace("MLFLOW", "")
     }
     assert importers == {"track"}
+
+
+def test_what_a_page_is_made_from_changes_the_hash_of_who_uses_it(source):
+    before = Code(source).hash("pipeline.a"), Code(source).hash("pipeline.b")
+    (source / "pipeline/deep/assets").mkdir()
+    (source / "pipeline/deep/assets/page.html").write_text("<p>")
+    after = Code(source).hash("pipeline.a"), Code(source).hash("pipeline.b")
+    assert before[0] != after[0]
+    assert before[1] == after[1]

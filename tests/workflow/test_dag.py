@@ -11,7 +11,7 @@ from pipeline.track.store import client
 OBJECTS = {"mug", "short_cup", "wide_bowl"}
 ASSEMBLED = {"assemble_parameters", "assemble_tilt_references"}
 ESTIMATED = {"assemble_uncertainties", "draw_parameters"}
-REPORTED = {"report", "report_evaluation"}
+REPORTED = {"report", "report_evaluation", "index"}
 CLASSIFIED = {"classify pouring", "classify filling"} | REPORTED
 LEARNT = {"classify_learning pouring", "classify_learning filling"} | CLASSIFIED
 POURED, FILLED = (
@@ -29,7 +29,7 @@ SIMULATED = _each("simulate_pouring") | _each("simulate_filling") | LEARNT
 CONTAINED = _each("simulate_container") | SIMULATED | {"draw_parameters"}
 COMPARED = _each("accuracy")
 PARAMETRISED = _each("parametrise") | ASSEMBLED | COMPARED | LEARNT
-UNCERTAIN = _each("uncertainties") | ESTIMATED | COMPARED | {"report"}
+UNCERTAIN = _each("uncertainties") | ESTIMATED | COMPARED | {"report", "index"}
 WARPED = _each("warp") | PARAMETRISED | UNCERTAIN | {"draw_labels"}
 
 
@@ -112,7 +112,7 @@ def test_one_core_gives_the_same_bytes_as_two(finished, unfinished):
         (
             "classify.learning_draws",
             3,
-            {"classify_learning pouring", "classify_learning filling", "report_evaluation"},
+            {"classify_learning pouring", "classify_learning filling", "report_evaluation", "index"},
         ),
         ("ablate.draws", 3, set()),
         ("track.experiment", "another", set()),
@@ -169,7 +169,7 @@ def test_two_keys_that_swap_their_values_are_a_change(project):
         ("simulate/trials.py", SIMULATED),
         ("simulate/fields.py", CONTAINED),
         ("classify/regression.py", LEARNT),
-        ("report/roc.py", {"report"}),
+        ("report/roc.py", {"report", "index"}),
         ("track/store.py", set()),
         ("workflow/objects.py", set()),
     ],

@@ -2,7 +2,7 @@
 # Makes report/accuracy/<object>.json, a demonstration object's errors against its truth.
 # Makes reports/roc.pdf (the paper's Fig. 3) with reports/metrics.json (every headline number), and reports/labels.pdf (Fig. 2);
 #       reports/parameters.pdf, every parameter on its object and against known values, and reports/parameters.json, volumes side by side;
-#       reports/scans/<object>.png, a page on each scan;
+#       reports/scans/<object>.png, a page on each scan; reports/index.html, all of this on one page for a browser;
 #       when asked for, reports/sources.pdf and .json, every demonstration object as the source for every other;
 #       reports/evaluation.pdf and .json, how sure the scores are and what that says of the paper's claims;
 #       when asked for, reports/ablations.pdf and .json, the scores with one key changed at a time;
@@ -229,3 +229,45 @@ rule report_sources:
     shell:
         "python -m pipeline.report.sources --processed {params.processed:q} --source {params.source} --objects {params.objects}"
         " --adopted {params.adopted} --page {output.page:q} --numbers {output.numbers:q} > {log:q} 2>&1"
+
+
+# What index.html shows: a line each for a figure (its words are in pipeline.report.index.figures) and for its numbers.
+INDEX_FIGURES = [
+    rules.report.output.roc,
+    rules.report_evaluation.output.page,
+    rules.draw_labels.output.figure,
+    rules.draw_parameters.output.page,
+]
+INDEX_NUMBERS = [
+    rules.report.output.metrics,
+    rules.report_evaluation.output.numbers,
+]
+
+
+rule index:
+    input:
+        figures=INDEX_FIGURES,
+        numbers=INDEX_NUMBERS,
+        scans=each(rules.draw_scan.output.page),
+        mesh=each(rules.fuse.output.mesh),
+        fusion=each(rules.fuse.output.report),
+        labels=each(rules.warp.output.label),
+        containers=each(rules.simulate_container.output.container),
+        parameters=expand(rules.assemble_parameters.output, source=SOURCE)[0],
+        uncertainties=rules.assemble_uncertainties.output[0],
+    output:
+        page=f"{REPORTS}/index.html",
+    log:
+        "logs/report/index.log",
+    threads: 1
+    params:
+        processed=PROCESSED,
+        source=SOURCE,
+        objects=" ".join(OBJECTS),
+        simulate=options("simulate", "engine", "spacing_m"),
+        classify=options("classify", "samples", "draws"),
+        code=code("pipeline.report.index"),
+    shell:
+        "python -m pipeline.report.index --processed {params.processed:q} --source {params.source} --objects {params.objects}"
+        " --numbers {input.numbers:q} --figures {input.figures:q} --scans {input.scans:q} {params.simulate} {params.classify}"
+        " --uncertainties {input.uncertainties:q} --output {output.page:q} > {log:q} 2>&1"

@@ -1,4 +1,4 @@
-"""One hash for all the code that a command runs: its module and every module of the package that it imports."""
+"""One hash for all the code that a command runs: its module, every module of the package that it imports, their assets."""
 
 import ast
 import hashlib
@@ -21,11 +21,15 @@ class Code:
     def hash(self, *entries: str) -> str:
         """Return a hash of what `python -m entry` runs for each of `entries`.
 
-        It follows imports, also those inside functions, transitively. Comments, docstrings and layout are no part of it.
+        It follows imports, also those inside functions, transitively. Comments, docstrings and layout are no part of it;
+        what a page is made from, in the folder `assets` of a package, is.
         """
         digest = hashlib.sha256()
-        for name in self.modules(*entries):
+        modules = self.modules(*entries)
+        for name in modules:
             digest.update(f"{name}\n{ast.dump(self._tree(name))}\n".encode())
+        for path in sorted(path for name in modules for path in self._assets(name)):
+            digest.update(f"{path.relative_to(self.source)}\n".encode() + path.read_bytes())
         return digest.hexdigest()[:16]
 
     def modules(self, *entries: str) -> list[str]:
@@ -47,6 +51,11 @@ class Code:
     def _file(self, name: str) -> Path:
         path = self.source / name.replace(".", "/")
         return path / "__init__.py" if (path / "__init__.py").is_file() else path.with_suffix(".py")
+
+    def _assets(self, name: str) -> list[Path]:
+        """Return the assets of a package; a module has none of its own."""
+        file = self._file(name)
+        return list(file.parent.glob("assets/*.*")) if file.name == "__init__.py" else []
 
     def _tree(self, name: str) -> ast.Module:
         file = self._file(name)

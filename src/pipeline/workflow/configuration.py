@@ -58,7 +58,7 @@ def check_annotation(folder: str | Path, source: str) -> str:
         found = sorted(file.stem for file in Path(folder).glob("*.parquet"))
         raise PipelineError(
             f"{path}: expected the human annotation of objects.source '{source}', found annotations of "
-            f"{' '.join(found) or 'no object'}; choose one of these as source, or annotate it"
+            f"{' '.join(found) or 'no object'}; choose one of these as source, or annotate it (pour annotate {source})"
         )
     return str(path)
 
