@@ -81,7 +81,7 @@ def _maximise(
     values: list[np.ndarray], trajectories: list[np.ndarray], shrink: _Shrinkage
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return mean (D*B,) and covariance (D*B, D*B) of the weights and the noise (D,), by expectation maximisation."""
-    weights = np.array([_regressed(*pair) for pair in zip(values, trajectories, strict=True)])
+    weights = np.array([regressed(*pair) for pair in zip(values, trajectories, strict=True)])
     count, n_basis = len(weights), values[0].shape[1]
     residuals = [
         y - phi @ w.reshape(-1, n_basis).T for phi, y, w in zip(values, trajectories, weights, strict=True)
@@ -99,7 +99,8 @@ def _maximise(
     return mean, shrink.covariance((weights - mean).T @ (weights - mean) + spread, count), noise
 
 
-def _regressed(phi: np.ndarray, trajectory: np.ndarray) -> np.ndarray:
+def regressed(phi: np.ndarray, trajectory: np.ndarray) -> np.ndarray:
+    """Return the weights (D*B,) of one trajectory (T, D) by least squares on its basis functions (T, B)."""
     n = phi.shape[1]
     gram = phi.T @ phi
     return np.linalg.solve(gram + 1e-6 * np.trace(gram) / n * np.eye(n), phi.T @ trajectory).T.ravel()
@@ -112,7 +113,7 @@ def _expect(
     covariance: np.ndarray,
     noise: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return each demonstration's expected weights (N, D*B), the sum of their covariances, and the noise (D,) that explains the rest."""
+    """Return each demonstration's expected weights (N, D*B), the sum of their covariances, and the noise (D,) of the rest."""
     n_basis, dimensions = values[0].shape[1], len(noise)
     precision = np.linalg.inv(covariance)
     weights, spread, squares = [], np.zeros_like(covariance), np.zeros(dimensions)

@@ -24,7 +24,11 @@ _ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class ProMP:
-    """A distribution over trajectories. weights_mean (D*B,) and weights_covariance (D*B, D*B), dimension by dimension; noise_variance (D,)."""
+    """A distribution over trajectories of D dimensions.
+
+    weights_mean (D*B,), weights_covariance (D*B, D*B): dimension by dimension; noise_variance (D,); width: standard deviation of a
+    basis function in the phase; duration_s: mean of the demonstrations'.
+    """
 
     weights_mean: np.ndarray
     weights_covariance: np.ndarray
@@ -41,7 +45,7 @@ class ProMP:
     ) -> "ProMP":
         """Learn from trajectories (T_i, D) at phases (T_i,), evenly from 0 to 1 if not given.
 
-        settings: those of `motion.fitting.estimate` (n_basis, width, prior_demonstrations) and the fields dimensions, units, duration_s.
+        settings: those of `motion.fitting.estimate`, and the fields dimensions, units, duration_s.
         """
         from pipeline.motion import fitting
 
