@@ -17,6 +17,7 @@ rule all:
         "reports/metrics.json",
         "reports/labels.pdf",
         each("reports/scans/{object}.png"),
+        primitives_figure(),
 
 
 include: "workflow/rules/scan.smk"
@@ -26,6 +27,7 @@ include: "workflow/rules/warp.smk"
 include: "workflow/rules/parametrise.smk"
 include: "workflow/rules/simulate.smk"
 include: "workflow/rules/classify.smk"
+include: "workflow/rules/primitives.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/track.smk"
 

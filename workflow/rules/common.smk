@@ -66,6 +66,12 @@ def each(pattern, names=OBJECTS):
     return expand(pattern, object=names, source=SOURCE)
 
 
+def primitives_figure():
+    """Return reports/promp.pdf if there are demonstrations and both containers of their pair take part."""
+    folder = os.path.join("data/demonstrations", config["primitives"]["demonstrations"])
+    return [f"{REPORTS}/promp.pdf"] if objects.demonstrated(folder, OBJECTS) else []
+
+
 wildcard_constraints:
     object="|".join(OBJECTS),
     source=SOURCE,

@@ -2,6 +2,7 @@
 # Makes report/accuracy/<object>.json, a demonstration object's errors against its truth.
 # Makes reports/roc.pdf (the paper's Fig. 3) with reports/metrics.json (every headline number), and reports/labels.pdf (Fig. 2);
 #       reports/scans/<object>.png, a page on each scan;
+#       reports/promp.pdf (Fig. 4) with reports/promp.json, where there are demonstrations of a pour;
 #       when asked for, reports/physics.pdf and reports/physics.json, the liquid against hydrostatics and against Bullet's spheres.
 # How: one module a figure; truth is compared here and nowhere else.
 
@@ -102,6 +103,24 @@ rule draw_scan:
     shell:
         "python -m pipeline.report.scans --mesh {input.mesh:q} --cloud {input.cloud:q} --fusion {input.fusion:q}"
         " --output {output.page:q} > {log:q} 2>&1"
+
+
+rule report_primitives:
+    input:
+        primitives=expand(rules.primitives.output.primitive, source=SOURCE, features=FEATURE_SETS),
+        trajectories=expand(rules.primitives.output.trajectories, source=SOURCE, features=FEATURE_SETS),
+    output:
+        pages=f"{REPORTS}/promp.pdf",
+        numbers=f"{REPORTS}/promp.json",
+    log:
+        "logs/report/promp.log",
+    threads: 1
+    params:
+        options=options("primitives", "prior_demonstrations"),
+        code=code("pipeline.report.primitives"),
+    shell:
+        "python -m pipeline.report.primitives --primitives {input.primitives:q} --trajectories {input.trajectories:q}"
+        " --pages {output.pages:q} --numbers {output.numbers:q} {params.options} > {log:q} 2>&1"
 
 
 rule report_physics:

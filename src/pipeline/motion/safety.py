@@ -11,11 +11,11 @@ STEPS = 201
 
 @dataclass(frozen=True)
 class Safety:
-    """Probabilities with standard errors: `approach` until the lip first comes above the opening, `ever` on the way back, too."""
+    """Probabilities with standard errors: `way_in` until the lip first comes above the opening, `ever` on the way back, too."""
 
-    approach: float
+    way_in: float
     ever: float
-    approach_error: float
+    way_in_error: float
     ever_error: float
     samples: int
 

@@ -2,6 +2,7 @@
 
 import os
 import re
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -57,6 +58,17 @@ def files(folder: str | Path) -> list[str]:
         folders[:] = [name for name in folders if os.path.realpath(os.path.join(parent, name)) not in walked]
         found += [os.path.join(parent, name) for name in names if not name.startswith(".")]
     return sorted(found)
+
+
+def demonstrated(folder: str | Path, names: Collection[str]) -> bool:
+    """Return whether `folder` holds demonstrations, and of a pair of containers that are among `names`."""
+    from pipeline.motion.demonstrations import read_pair
+
+    pair = Path(folder) / "pair.yaml"
+    if not pair.is_file():
+        return False
+    shown = read_pair(pair)
+    return {shown["held_object"], shown["target_object"]} <= set(names)
 
 
 def _folders(raw: Path, exclude: set[str]) -> set[str]:
