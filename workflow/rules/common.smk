@@ -28,6 +28,8 @@ try:
     configuration.check(config, schema)
     FOUND = objects.find(RAW, config)
     SOURCE = config["objects"]["source"]
+    DEMONSTRATIONS = os.path.join("data/demonstrations", config["primitives"]["demonstrations"])
+    HAS_DEMONSTRATIONS = objects.demonstrated(DEMONSTRATIONS, FOUND.names)
     ANNOTATION = configuration.check_annotation("config/annotations", SOURCE)
 except PipelineError as error:
     sys.exit(f"error: {error}")
@@ -68,8 +70,7 @@ def each(pattern, names=OBJECTS):
 
 def primitives_figure():
     """Return reports/promp.pdf if there are demonstrations and both containers of their pair take part."""
-    folder = os.path.join("data/demonstrations", config["primitives"]["demonstrations"])
-    return [f"{REPORTS}/promp.pdf"] if objects.demonstrated(folder, OBJECTS) else []
+    return [f"{REPORTS}/promp.pdf"] if HAS_DEMONSTRATIONS else []
 
 
 wildcard_constraints:

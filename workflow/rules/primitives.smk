@@ -3,7 +3,6 @@
 #       the pours themselves, scaled and aligned.
 # How: probabilistic movement primitives; a prior on correlations, as pours are fewer than weights.
 
-DEMONSTRATIONS = os.path.join("data/demonstrations", config["primitives"]["demonstrations"])
 
 FEATURE_SETS = ["label_mapping", "point_mapping", "standard"]
 

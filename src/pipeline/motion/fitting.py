@@ -27,7 +27,7 @@ def estimate(
     *,
     n_basis: int = 15,
     width: float | None = None,
-    prior_demonstrations: float = 3.0,
+    prior_demonstrations: float = 5.0,
 ) -> dict[str, Any]:
     """Return weights_mean, weights_covariance, noise_variance, n_basis and width of trajectories (T_i, D) at phases (T_i,)."""
     if len(trajectories) < 2:

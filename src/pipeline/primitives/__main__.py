@@ -27,7 +27,7 @@ def main() -> None:
     parser.add_argument("--features", choices=FEATURES, required=True)
     parser.add_argument("--basis", type=int, default=20, help="basis functions a dimension")
     parser.add_argument(
-        "--prior-demonstrations", type=float, default=3.0, help="how many the prior counts as"
+        "--prior-demonstrations", type=float, default=5.0, help="how many the prior counts as"
     )
     parser.add_argument("--samples", type=int, default=2000, help="trajectories drawn to tell how safe it is")
     parser.add_argument("--seed", type=int, default=0, help="of these")

@@ -25,7 +25,7 @@ def main() -> None:
     parser = command.parser(__doc__)
     for option in ("--primitives", "--trajectories"):
         parser.add_argument(option, type=Path, nargs="+", required=True, help="one file a feature set")
-    parser.add_argument("--prior-demonstrations", type=float, default=3.0, help="as the primitives have it")
+    parser.add_argument("--prior-demonstrations", type=float, default=5.0, help="as the primitives have it")
     parser.add_argument("--pages", type=Path, required=True)
     parser.add_argument("--numbers", type=Path, required=True)
     options = parser.parse_args()

@@ -61,13 +61,22 @@ def files(folder: str | Path) -> list[str]:
 
 
 def demonstrated(folder: str | Path, names: Collection[str]) -> bool:
-    """Return whether `folder` holds demonstrations, and of a pair of containers that are among `names`."""
+    """Return whether `folder` holds demonstrations, and of a pair of containers that are among `names`.
+
+    Errors: there are demonstrations, but not under this name; pair.yaml cannot be read.
+    """
     from pipeline.motion.demonstrations import read_pair
 
-    pair = Path(folder) / "pair.yaml"
-    if not pair.is_file():
+    folder = Path(folder)
+    if not folder.is_dir():
+        others = sorted(path.parent.name for path in folder.parent.glob("*/pair.yaml"))
+        if others:
+            raise PipelineError(
+                f"primitives.demonstrations: expected one of {' '.join(others)}, found '{folder.name}'"
+                f"{nearest(folder.name, others)}; correct it"
+            )
         return False
-    shown = read_pair(pair)
+    shown = read_pair(folder / "pair.yaml")
     return {shown["held_object"], shown["target_object"]} <= set(names)
 
 
