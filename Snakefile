@@ -21,6 +21,7 @@ rule all:
         each("reports/scans/{object}.png"),
         expand(f"{PROCESSED}/parametrise/{{source}}/parameters.parquet", source=FURTHER_SOURCES),
         "reports/index.html",
+        primitives_figure(),
 
 
 include: "workflow/rules/scan.smk"
@@ -31,6 +32,7 @@ include: "workflow/rules/parametrise.smk"
 include: "workflow/rules/simulate.smk"
 include: "workflow/rules/classify.smk"
 include: "workflow/rules/ablate.smk"
+include: "workflow/rules/primitives.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/track.smk"
 

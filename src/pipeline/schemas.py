@@ -73,6 +73,8 @@ TABLES = {
         + _floats("density_error", "hydrostatic_margin")
         + [("poured", pa.bool_()), ("filled", pa.bool_()), ("failed", pa.bool_())]
     ),
+    # Pours that a primitive was learnt from, at aligned phases, divided by its features' references (standard: metres, radians).
+    "demonstrations": pa.schema(_integers("pour") + _floats("phase", "x", "y", "z", "tilt")),
     # Checks of the liquid; what x, measured and expected are is said at each check (simulate.measures, .convergence).
     "physics": pa.schema(
         _strings("check", "vessel")

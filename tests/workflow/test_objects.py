@@ -3,7 +3,7 @@
 import pytest
 
 from pipeline.errors import PipelineError
-from pipeline.workflow.objects import files, find
+from pipeline.workflow.objects import demonstrated, files, find
 
 
 def _config(scanned=("mug", "jug"), exclude=(), held=("mug",), source="mug") -> dict:
@@ -75,3 +75,14 @@ def test_a_file_name_that_no_one_can_print(tmp_path):
     (tmp_path / "cup/a\nb.ply").touch()
     with pytest.raises(PipelineError, match="printable"):
         find(tmp_path, _config())
+
+
+def test_demonstrations_count_where_both_containers_take_part(tmp_path):
+    folder = tmp_path / "mine"
+    assert not demonstrated(folder, ["mug", "bowl"])
+    folder.mkdir()
+    (folder / "pair.yaml").write_text("held_object: mug\ntarget_object: bowl\n")
+    assert demonstrated(folder, ["mug", "bowl"])
+    assert not demonstrated(folder, ["mug", "jug"])
+    with pytest.raises(PipelineError, match=r"expected one of mine, found 'mime' \(did you mean 'mine'"):
+        demonstrated(tmp_path / "mime", ["mug", "bowl"])

@@ -29,6 +29,8 @@ try:
     FOUND = objects.find(RAW, config)
     # The first source is the one that classifiers and figures take; further ones are warped and measured beside it.
     SOURCE, *FURTHER_SOURCES = objects.sources(config)
+    DEMONSTRATIONS = os.path.join("data/demonstrations", config["primitives"]["demonstrations"])
+    HAS_DEMONSTRATIONS = objects.demonstrated(DEMONSTRATIONS, FOUND.names)
     ANNOTATION = configuration.check_annotation("config/annotations", SOURCE)
 except PipelineError as error:
     sys.exit(f"error: {error}")
@@ -71,6 +73,11 @@ def named(option, pattern, wanted=True):
     """Return `--option NAME=PATH …` with the path of each object when it is wanted, else nothing."""
     words = " ".join(f"{name}={path}" for name, path in zip(OBJECTS, each(pattern)))
     return f"--{option} {words}" if wanted else ""
+
+
+def primitives_figure():
+    """Return reports/promp.pdf if there are demonstrations and both containers of their pair take part."""
+    return [f"{REPORTS}/promp.pdf"] if HAS_DEMONSTRATIONS else []
 
 
 wildcard_constraints:

@@ -6,6 +6,7 @@
 #       when asked for, reports/sources.pdf and .json, every demonstration object as the source for every other;
 #       reports/evaluation.pdf and .json, how sure the scores are and what that says of the paper's claims;
 #       when asked for, reports/ablations.pdf and .json, the scores with one key changed at a time;
+#       reports/promp.pdf (Fig. 4) with reports/promp.json, where there are demonstrations of a pour;
 #       when asked for, reports/physics.pdf and reports/physics.json, the liquid against hydrostatics and against Bullet's spheres.
 # How: one module a figure; truth is compared here and nowhere else.
 
@@ -184,6 +185,24 @@ rule draw_scan:
     shell:
         "python -m pipeline.report.scans --mesh {input.mesh:q} --cloud {input.cloud:q} --fusion {input.fusion:q}"
         " --output {output.page:q} > {log:q} 2>&1"
+
+
+rule report_primitives:
+    input:
+        primitives=expand(rules.primitives.output.primitive, source=SOURCE, features=FEATURE_SETS),
+        trajectories=expand(rules.primitives.output.trajectories, source=SOURCE, features=FEATURE_SETS),
+    output:
+        pages=f"{REPORTS}/promp.pdf",
+        numbers=f"{REPORTS}/promp.json",
+    log:
+        "logs/report/promp.log",
+    threads: 1
+    params:
+        options=options("primitives", "prior_demonstrations"),
+        code=code("pipeline.report.primitives"),
+    shell:
+        "python -m pipeline.report.primitives --primitives {input.primitives:q} --trajectories {input.trajectories:q}"
+        " --pages {output.pages:q} --numbers {output.numbers:q} {params.options} > {log:q} 2>&1"
 
 
 rule report_physics:

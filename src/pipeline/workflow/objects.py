@@ -2,6 +2,7 @@
 
 import os
 import re
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -63,6 +64,26 @@ def files(folder: str | Path) -> list[str]:
         folders[:] = [name for name in folders if os.path.realpath(os.path.join(parent, name)) not in walked]
         found += [os.path.join(parent, name) for name in names if not name.startswith(".")]
     return sorted(found)
+
+
+def demonstrated(folder: str | Path, names: Collection[str]) -> bool:
+    """Return whether `folder` holds demonstrations, and of a pair of containers that are among `names`.
+
+    Errors: there are demonstrations, but not under this name; pair.yaml cannot be read.
+    """
+    from pipeline.motion.demonstrations import read_pair
+
+    folder = Path(folder)
+    if not folder.is_dir():
+        others = sorted(path.parent.name for path in folder.parent.glob("*/pair.yaml"))
+        if others:
+            raise PipelineError(
+                f"primitives.demonstrations: expected one of {' '.join(others)}, found '{folder.name}'"
+                f"{nearest(folder.name, others)}; correct it"
+            )
+        return False
+    shown = read_pair(folder / "pair.yaml")
+    return {shown["held_object"], shown["target_object"]} <= set(names)
 
 
 def _folders(raw: Path, exclude: set[str]) -> set[str]:
