@@ -1,6 +1,6 @@
 """Show ten pours with the demonstration pair: a scripted hand guides the arm, and what the arm did is recorded.
 
-The teacher knows this pair alone, in metres and radians of the cell: no radius, lip, volume or tilt reference of another object. All
+The teacher knows this pair alone, in metres and radians of the cell: no radius, lip or tilt reference of another. All
 numbers below were fixed before a novel pair was run.
 """
 
