@@ -98,7 +98,7 @@ class Containers:
         if self.gap_m(self._scout[held], second, 0.0) < 0.0:
             return True
         arm_m = self._arm_m(held, T_world_held, lip_world, axis_world)
-        from_lip = (T_world_held[:3, 3] - lip_world).tolist(), _quaternion(T_world_held[:3, :3])
+        from_lip = (T_world_held[:3, 3] - lip_world).tolist(), bodies.quaternion(T_world_held[:3, :3])
         tilt_now, look_ahead_m = 0.0, 0.0
         while True:
             turn = lip_world.tolist(), pybullet.getQuaternionFromAxisAngle(axis_world.tolist(), tilt_now)
