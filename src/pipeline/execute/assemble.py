@@ -10,13 +10,14 @@ def main() -> None:
     """Write the executions, and all trajectories, of all pairs."""
     parser = command.parser(__doc__)
     parser.add_argument("--source", required=True, help="the annotated object that all are warped from")
-    for name in ("--attempts", "--outcomes", "--trajectory-tables"):
-        parser.add_argument(name, nargs="+", type=Path, required=True, help="tables, in any order")
+    for name in ("--attempts", "--outcomes"):
+        parser.add_argument(name, nargs="+", type=Path, required=True, help="tables of all pairs")
+    parser.add_argument("--trajectory-tables", nargs="*", type=Path, help="those of all pairs")
     parser.add_argument("--parameters", type=Path, required=True, help="warped parameters of all objects")
     parser.add_argument("--fill", type=float, default=0.5, help="share of the held cup's capacity")
     parser.add_argument("--liquid", action="store_true", help="judge as a liquid, not as gel balls")
-    for name in ("--executions", "--trajectories"):
-        parser.add_argument(name, type=Path, help="where it is written")
+    parser.add_argument("--executions", type=Path, required=True, help="where they are written")
+    parser.add_argument("--trajectories", type=Path, help="where they are written, if at all")
     options = parser.parse_args()
 
     import pandas as pd
