@@ -26,6 +26,7 @@ include: "workflow/rules/warp.smk"
 include: "workflow/rules/parametrise.smk"
 include: "workflow/rules/simulate.smk"
 include: "workflow/rules/classify.smk"
+include: "workflow/rules/execute.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/track.smk"
 

@@ -122,3 +122,46 @@ rule report_physics:
     shell:
         "python -m pipeline.report.physics --measurements {input.measurements:q} --trials {input.trials:q}"
         " --other-trials {params.others} --page {output.page:q} --numbers {output.numbers:q} {params.options} > {log:q} 2>&1"
+
+
+# The first pairs of the configuration are filmed.
+FILMED = PAIRS[:4]
+
+
+rule report_execution:
+    input:
+        executions=rules.assemble_executions.output.executions,
+        trajectories=rules.assemble_executions.output.trajectories,
+        parameters=rules.assemble_parameters.output,
+        films=[rules.execute_film.output.film.format(held=held, target=target) for held, target in FILMED],
+    output:
+        pages=f"{REPORTS}/execution.pdf",
+        film=f"{REPORTS}/execution.gif",
+        numbers=f"{REPORTS}/execution.json",
+    log:
+        "logs/report/execution.log",
+    threads: 1
+    params:
+        films=" ".join(f"{h}/{t}={PROCESSED}/execute/{h}/{t}/film.npz" for h, t in FILMED),
+        demonstrated="/".join(DEMONSTRATED),
+        code=code("pipeline.report.execution"),
+    shell:
+        "python -m pipeline.report.execution --executions {input.executions:q} --trajectories {input.trajectories:q}"
+        " --parameters {input.parameters:q} --demonstrated {params.demonstrated} --films {params.films}"
+        " --pages {output.pages:q} --film {output.film:q} --numbers {output.numbers:q} > {log:q} 2>&1"
+
+
+rule report_pairs:
+    input:
+        executions=rules.assemble_pairs.output.executions,
+    output:
+        page=f"{REPORTS}/pairs.pdf",
+        numbers=f"{REPORTS}/pairs.json",
+    log:
+        "logs/report/pairs.log",
+    threads: 1
+    params:
+        code=code("pipeline.report.pairs"),
+    shell:
+        "python -m pipeline.report.pairs --executions {input.executions:q} --page {output.page:q} --numbers {output.numbers:q}"
+        " > {log:q} 2>&1"

@@ -1,4 +1,4 @@
-"""Every object poured into every other with the liquid: reports/pairs.pdf, a heat map a feature set and a table, and the numbers."""
+"""Every object poured into every other with the liquid: reports/pairs.pdf, heat maps and a table, and the numbers."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
