@@ -21,7 +21,7 @@ rule all:
         each("reports/scans/{object}.png"),
         expand(f"{PROCESSED}/parametrise/{{source}}/parameters.parquet", source=FURTHER_SOURCES),
         "reports/index.html",
-        primitives_figure(),
+        robot_figures(),
 
 
 include: "workflow/rules/scan.smk"
@@ -33,6 +33,7 @@ include: "workflow/rules/simulate.smk"
 include: "workflow/rules/classify.smk"
 include: "workflow/rules/ablate.smk"
 include: "workflow/rules/primitives.smk"
+include: "workflow/rules/execute.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/track.smk"
 

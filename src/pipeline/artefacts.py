@@ -17,6 +17,7 @@ from pipeline.errors import PipelineError
 from pipeline.schemas import TABLES
 
 Mesh = tuple[np.ndarray, np.ndarray]
+Arrays = dict[str, np.ndarray]
 
 
 @contextmanager
@@ -126,3 +127,20 @@ def points(frame: pd.DataFrame) -> np.ndarray:
 def normals(frame: pd.DataFrame) -> np.ndarray:
     """Return the columns nx, ny, nz as an array (N, 3) of unit vectors."""
     return frame[["nx", "ny", "nz"]].to_numpy(float)
+
+
+def poses(frame: pd.DataFrame) -> np.ndarray:
+    """Return the columns x_m, y_m, z_m, qx, qy, qz, qw as poses (N, 4, 4)."""
+    from scipy.spatial.transform import Rotation
+
+    T = np.tile(np.eye(4), (len(frame), 1, 1))
+    T[:, :3, :3] = Rotation.from_quat(frame[["qx", "qy", "qz", "qw"]].to_numpy(float)).as_matrix()
+    T[:, :3, 3] = points(frame)
+    return T
+
+
+def T_world_second(trajectory: pd.DataFrame) -> np.ndarray:
+    """Return where the second container of a trajectory stands (4, 4): upright on the table."""
+    T = np.eye(4)
+    T[:2, 3] = trajectory[["second_x_m", "second_y_m"]].iloc[0]
+    return T

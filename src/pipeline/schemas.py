@@ -23,6 +23,9 @@ def _strings(*names: str) -> list[tuple[str, pa.DataType]]:
 _CURVE = _strings("experiment", "features", "split", "training_object") + _integers("draw")
 _MEASURES = ("auc", "partial_auc", "tpr_at_fpr_00", "tpr_at_fpr_01", "tpr_at_fpr_05", "brier")
 
+_EXECUTION = _strings("held_object", "target_object", "features") + _integers("draw")
+_COUNTS = _integers("n_balls", "n_poured", "n_in_target", "n_spilled", "n_overflowed", "n_early", "n_leaked")
+
 TABLES = {
     # Points that a human labelled, in the frame of the scan (world).
     "annotation": pa.schema(_floats("x_m", "y_m", "z_m") + _PARTS),
@@ -75,6 +78,33 @@ TABLES = {
     ),
     # Pours that a primitive was learnt from, at aligned phases, divided by its features' references (standard: metres, radians).
     "demonstrations": pa.schema(_integers("pour") + _floats("phase", "x", "y", "z", "tilt")),
+    # What the arm did, 60 poses a second. World: the table's top is z = 0, the opening's centre over the origin, the pour along
+    # +x; the second container stands upright at second_x_m, second_y_m. lip_*_m, tilt_rad: the held cup's own lip relative to the
+    # centre of the second's own opening.
+    "trajectories": pa.schema(
+        [*_EXECUTION, *_floats("t_s", "x_m", "y_m", "z_m", "qx", "qy", "qz", "qw")]
+        + _floats("lip_x_m", "lip_y_m", "lip_z_m", "tilt_rad", "second_x_m", "second_y_m")
+    ),
+    # Samples of a draw, in order, until the arm could follow one: why not (empty: it did), and how far from the plan its lip was.
+    "attempts": pa.schema(
+        [*_EXECUTION, *_integers("attempt"), *_strings("refused"), *_floats("duration_s", "off_plan_m")]
+    ),
+    # What was poured along the arm's poses. poured: left the cup; of the spilled: overflowed or early, or aimed badly.
+    "carried": pa.schema(
+        [*_EXECUTION, *_COUNTS, *_floats("first_drop_s", "first_spill_s"), ("failed", pa.bool_())]
+    ),
+    # Both together, with the verdict: cause is arm, early_pour, overflow, aim, lip, leak, or empty when it succeeded.
+    "executions": pa.schema(
+        [
+            *_strings("source"),
+            *_EXECUTION,
+            *_integers("n_refused"),
+            *_COUNTS,
+            *_floats("first_drop_s", "first_spill_s"),
+        ]
+        + _floats("duration_s", "off_plan_m", "fill_m3", "target_capacity_m3")
+        + [("fits", pa.bool_()), ("success", pa.bool_()), *_strings("cause", "refused")]
+    ),
     # Checks of the liquid; what x, measured and expected are is said at each check (simulate.measures, .convergence).
     "physics": pa.schema(
         _strings("check", "vessel")

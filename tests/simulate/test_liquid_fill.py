@@ -85,7 +85,7 @@ def test_a_thrown_particle_flies_as_ballistics_says(bowl: Vessel) -> None:
     flight[0, 0], flight[1, 0] = start, speed
     reach, flying, steps = 2 * bowl.spacing_m, 1, 0
     while flying:
-        flying, joined = filling._fly(q, bowl.walls, flight, flying, np.eye(4), dt, reach)
+        flying, joined = filling.fly(q, bowl.walls, flight, flying, np.eye(4), dt, reach)
         steps += 1
     assert joined == 1
     t = steps * dt
@@ -105,7 +105,7 @@ def test_what_comes_down_outside_the_contour_stays_outside(bowl: Vessel) -> None
     )  # on its way in, but below the rim before it is there
     flying = 1
     while flying:
-        flying, joined = filling._fly(q, bowl.walls, flight, flying, np.eye(4), 0.005, 2 * bowl.spacing_m)
+        flying, joined = filling.fly(q, bowl.walls, flight, flying, np.eye(4), 0.005, 2 * bowl.spacing_m)
         assert joined == 0
     assert q.count[0] == 0
 

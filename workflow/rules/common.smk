@@ -75,9 +75,9 @@ def named(option, pattern, wanted=True):
     return f"--{option} {words}" if wanted else ""
 
 
-def primitives_figure():
-    """Return reports/promp.pdf if there are demonstrations and both containers of their pair take part."""
-    return [f"{REPORTS}/promp.pdf"] if HAS_DEMONSTRATIONS else []
+def robot_figures():
+    """Return the figures of the robot's half if there are demonstrations and both containers of their pair take part."""
+    return [f"{REPORTS}/{name}.pdf" for name in ("promp", "execution")] if HAS_DEMONSTRATIONS else []
 
 
 wildcard_constraints:

@@ -7,6 +7,8 @@
 #       reports/evaluation.pdf and .json, how sure the scores are and what that says of the paper's claims;
 #       when asked for, reports/ablations.pdf and .json, the scores with one key changed at a time;
 #       reports/promp.pdf (Fig. 4) with reports/promp.json, where there are demonstrations of a pour;
+#       reports/execution.pdf (Fig. 5), execution.gif and execution.json, what the robot poured, where there are demonstrations;
+#       when asked for, reports/pairs.pdf and .json, every object into every other, with the liquid;
 #       when asked for, reports/physics.pdf and reports/physics.json, the liquid against hydrostatics and against Bullet's spheres.
 # How: one module a figure; truth is compared here and nowhere else.
 
@@ -250,12 +252,56 @@ rule report_sources:
         " --adopted {params.adopted} --page {output.page:q} --numbers {output.numbers:q} > {log:q} 2>&1"
 
 
+# The first pairs of the configuration are filmed.
+FILMED = PAIRS[:4]
+
+
+rule report_execution:
+    input:
+        executions=rules.assemble_executions.output.executions,
+        trajectories=rules.assemble_executions.output.trajectories,
+        parameters=expand(rules.assemble_parameters.output, source=SOURCE),
+        films=[rules.execute_film.output.film.format(held=held, target=target) for held, target in FILMED],
+    output:
+        pages=f"{REPORTS}/execution.pdf",
+        film=f"{REPORTS}/execution.gif",
+        numbers=f"{REPORTS}/execution.json",
+    log:
+        "logs/report/execution.log",
+    threads: 1
+    params:
+        films=" ".join(f"{h}/{t}={PROCESSED}/execute/{h}/{t}/film.npz" for h, t in FILMED),
+        demonstrated="/".join(DEMONSTRATED),
+        code=code("pipeline.report.execution"),
+    shell:
+        "python -m pipeline.report.execution --executions {input.executions:q} --trajectories {input.trajectories:q}"
+        " --parameters {input.parameters:q} --demonstrated {params.demonstrated} --films {params.films}"
+        " --pages {output.pages:q} --film {output.film:q} --numbers {output.numbers:q} > {log:q} 2>&1"
+
+
+rule report_pairs:
+    input:
+        executions=rules.assemble_pairs.output.executions,
+    output:
+        page=f"{REPORTS}/pairs.pdf",
+        numbers=f"{REPORTS}/pairs.json",
+    log:
+        "logs/report/pairs.log",
+    threads: 1
+    params:
+        code=code("pipeline.report.pairs"),
+    shell:
+        "python -m pipeline.report.pairs --executions {input.executions:q} --page {output.page:q} --numbers {output.numbers:q}"
+        " > {log:q} 2>&1"
+
+
 # What index.html shows: a line each for a figure (its words are in pipeline.report.index.figures) and for its numbers.
 INDEX_FIGURES = [
     rules.report.output.roc,
     rules.report_evaluation.output.page,
     rules.draw_labels.output.figure,
     rules.draw_parameters.output.page,
+    *robot_figures(),
 ]
 INDEX_NUMBERS = [
     rules.report.output.metrics,

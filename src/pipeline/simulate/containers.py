@@ -4,13 +4,10 @@ The second container is a static concave mesh. The held one is a compound of con
 collide two concave meshes): cells of azimuth × height (squares on the floor), split again where a handle stands off the wall.
 """
 
-from pathlib import Path
-from tempfile import TemporaryDirectory
-
 import numpy as np
 import pybullet
 
-from pipeline.geometry import frames
+from pipeline.geometry import bodies, frames
 
 # Bullet wraps every shape in a margin (pybullet's default); reported distances are corrected for both.
 _MARGIN_M = 0.001
@@ -53,13 +50,7 @@ class Containers:
 
     def add_second(self, vertices_m: np.ndarray, triangles: np.ndarray) -> int:
         """Add a static container by a coarse mesh (V, 3), (F, 3) in its object frame; return Bullet's number of the body."""
-        shape = pybullet.createCollisionShape(
-            pybullet.GEOM_MESH,
-            vertices=vertices_m.tolist(),
-            indices=triangles.ravel().tolist(),
-            flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
-            physicsClientId=self._client,
-        )
+        shape = bodies.concave(vertices_m, triangles, self._client)
         return pybullet.createMultiBody(0.0, shape, physicsClientId=self._client)
 
     def add_held(self, pieces: list[np.ndarray]) -> int:
@@ -73,22 +64,12 @@ class Containers:
         return body
 
     def _compound(self, pieces: list[np.ndarray]) -> int:
-        with TemporaryDirectory() as folder:
-            path = Path(folder) / "pieces.obj"
-            path.write_text(_obj(pieces))
-            shape = pybullet.createCollisionShape(
-                pybullet.GEOM_MESH, fileName=str(path), physicsClientId=self._client
-            )
+        shape = bodies.compound(pieces, self._client)
         return pybullet.createMultiBody(1.0, shape, physicsClientId=self._client)
 
     def move(self, body: int, T_world_body: np.ndarray) -> None:
         """Put a body at a pose (4, 4)."""
-        pybullet.resetBasePositionAndOrientation(
-            body,
-            T_world_body[:3, 3].tolist(),
-            _quaternion(T_world_body[:3, :3]),
-            physicsClientId=self._client,
-        )
+        bodies.place(body, T_world_body, self._client)
 
     def gap_m(self, held: int, second: int, look_ahead_m: float = 0.02) -> float:
         """Return the distance between two bodies where they are (negative: they overlap); at most `look_ahead_m`."""
@@ -117,7 +98,7 @@ class Containers:
         if self.gap_m(self._scout[held], second, 0.0) < 0.0:
             return True
         arm_m = self._arm_m(held, T_world_held, lip_world, axis_world)
-        from_lip = (T_world_held[:3, 3] - lip_world).tolist(), _quaternion(T_world_held[:3, :3])
+        from_lip = (T_world_held[:3, 3] - lip_world).tolist(), bodies.quaternion(T_world_held[:3, :3])
         tilt_now, look_ahead_m = 0.0, 0.0
         while True:
             turn = lip_world.tolist(), pybullet.getQuaternionFromAxisAngle(axis_world.tolist(), tilt_now)
@@ -185,17 +166,6 @@ def _extremes(points: np.ndarray) -> np.ndarray:
     return points[np.unique(np.argmax(points @ directions.T, axis=0))]
 
 
-def _obj(pieces: list[np.ndarray]) -> str:
-    """Return an OBJ text with one object a piece; Bullet makes each a convex hull of its points (faces only list them)."""
-    lines, first = [], 1
-    for number, points in enumerate(pieces):
-        lines.append(f"o piece{number}")
-        lines += [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in points]
-        lines += [f"f {first} {first + i} {first + (i + 1) % len(points)}" for i in range(len(points))]
-        first += len(points)
-    return "\n".join(lines) + "\n"
-
-
 def decimated(vertices_m: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return a mesh with few enough triangles for Bullet: neighbours merged first, which is fast, then quadric decimation."""
     import open3d as o3d
@@ -209,9 +179,3 @@ def decimated(vertices_m: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray
     if len(mesh.triangles) > n:
         mesh = mesh.simplify_quadric_decimation(n)
     return np.asarray(mesh.vertices), np.asarray(mesh.triangles)
-
-
-def _quaternion(R: np.ndarray) -> list[float]:
-    from scipy.spatial.transform import Rotation
-
-    return Rotation.from_matrix(R, assume_valid=True).as_quat().tolist()

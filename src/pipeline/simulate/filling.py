@@ -69,8 +69,8 @@ def fill(
     arguments give the same bits.
     """
     dt = min(time_step_s(held), time_step_s(second))
-    p, well_held, kept_held = _filled(held, n_held, n_held, seed, 0, dt)
-    q, well_second, kept_second = _filled(second, n_second, n_second + n_held, seed, 1, dt)
+    p, well_held, kept_held = filled(held, n_held, n_held, seed, 0, dt)
+    q, well_second, kept_second = filled(second, n_second, n_second + n_held, seed, 1, dt)
     n = n_held + n_second
     if not (kept_held and kept_second and well_held and well_second):
         settling = not (kept_held and kept_second)
@@ -88,7 +88,7 @@ def fill(
     return Filling(n, retained, in_second, spilled, leaked, error, not well, False)
 
 
-def _filled(vessel: Vessel, n: int, capacity: int, seed: int, stream: int, dt: float):
+def filled(vessel: Vessel, n: int, capacity: int, seed: int, stream: int, dt: float):
     """Return a vessel's particles at rest, whether all went well and whether all stayed."""
     start = settle(vessel, n, (seed, stream))
     p = particles(capacity, vessel.walls)
@@ -129,8 +129,8 @@ def _take_off(p, walls, flight, flying, T_world_held, lip_world, lip, axis, tilt
             continue
         r = (p.gone_x[g, 0] - lip[0], p.gone_x[g, 1] - lip[1], p.gone_x[g, 2] - lip[2])
         r, u = (
-            _rotated(T_world_held, r),
-            _rotated(T_world_held, (p.gone_v[g, 0], p.gone_v[g, 1], p.gone_v[g, 2])),
+            rotated(T_world_held, r),
+            rotated(T_world_held, (p.gone_v[g, 0], p.gone_v[g, 1], p.gone_v[g, 2])),
         )
         u = (
             u[0] + speed * (axis[1] * r[2] - axis[2] * r[1]),
@@ -145,7 +145,7 @@ def _take_off(p, walls, flight, flying, T_world_held, lip_world, lip, axis, tilt
 
 
 @part
-def _rotated(T, x):
+def rotated(T, x):
     """Return T's rotation of a vector (x, y, z)."""
     return (
         T[0, 0] * x[0] + T[0, 1] * x[1] + T[0, 2] * x[2],
@@ -165,7 +165,7 @@ def _rotated_back(T, x):
 
 
 @part
-def _fly(q, walls, flight, flying, T_world_second, dt, reach):
+def fly(q, walls, flight, flying, T_world_second, dt, reach):
     """Advance the flying particles; return how many still fly and how many joined the second."""
     still = joined = 0
     here, there = T_world_second[:3, 3], flight[0]
@@ -217,7 +217,7 @@ def _fill(p, walls, q, second, flight, T_world_held, lip_world, lip, T_world_sec
                 quiet = t - last_left > QUIET_S and squares < QUIET_SPEED**2
                 pouring = can and not quiet and t < TILT_S + HELD_WAIT_S
             pouring = pouring and p.count[0] > 0
-        flying, joined = _fly(q, second, flight, flying, T_world_second, dt, reach)
+        flying, joined = fly(q, second, flight, flying, T_world_second, dt, reach)
         if joined > 0:
             awake, last_event = True, t
         if awake:

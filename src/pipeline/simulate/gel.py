@@ -44,6 +44,12 @@ def prepare(
     return pot
 
 
+def alike(pot: Pot, cavity: Cavity, vertices_m: np.ndarray, triangles: np.ndarray) -> Pot:
+    """Return another container for the balls of a pot: prepared for Bullet, vertices (V, 3), triangles (F, 3)."""
+    walls = precompute(cavity, pot.spacing_m, 0.0).walls
+    return Pot(cavity, pot.spacing_m, pot.radius_m, *decimated(vertices_m, triangles), walls, pot.matter)
+
+
 def bulk_m3(pot: Pot, x: np.ndarray) -> float:
     """Return the room below the mean top of the uppermost spheres of x (n, 3) at rest."""
     cup, room = pot.cavity, room_m3(pot.cavity)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pybullet
 
+from pipeline.geometry import bodies
 from pipeline.geometry.cavity import Cavity
 from pipeline.simulate.fields import Walls
 from pipeline.simulate.forces import Response
@@ -71,13 +72,7 @@ class World:
             contactBreakingThreshold=_LOOK_AHEAD * pot.spacing_m,
             physicsClientId=self._client,
         )
-        wall = pybullet.createCollisionShape(
-            pybullet.GEOM_MESH,
-            vertices=pot.vertices_m.tolist(),
-            indices=pot.triangles.ravel().tolist(),
-            flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
-            physicsClientId=self._client,
-        )
+        wall = bodies.concave(pot.vertices_m, pot.triangles, self._client)
         self._body(0.0, wall, [0.0, 0.0, 0.0], _WALL, _SPHERES)
         self._sphere = pybullet.createCollisionShape(
             pybullet.GEOM_SPHERE, radius=pot.radius_m, physicsClientId=self._client

@@ -1,0 +1,99 @@
+"""Report what the robot poured: reports/execution.pdf (Fig. 5 and rates), a film, and the numbers."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipeline import command
+from pipeline.artefacts import read_arrays, read_table, replacing, write_json
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from pipeline.report.execution_page import Film
+
+_WIDTH_PX = 360  # of each picture in the film
+
+
+def main() -> None:
+    """Read executions, trajectories and films; write the pages, the film and the numbers."""
+    parser = command.parser(__doc__)
+    parser.add_argument("--executions", type=Path, required=True)
+    parser.add_argument("--trajectories", type=Path, required=True)
+    parser.add_argument("--parameters", type=Path, required=True, help="warped parameters of all objects")
+    parser.add_argument("--demonstrated", required=True, help="the demonstrated pair, as held/target")
+    parser.add_argument(
+        "--films", nargs="+", required=True, type=command.name_and_path, metavar="HELD/TARGET=FILE"
+    )
+    for name in ("--pages", "--film", "--numbers"):
+        parser.add_argument(name, type=Path, required=True)
+    options = parser.parse_args()
+
+    from pipeline.report import execution_numbers, execution_page
+    from pipeline.report.style import save
+
+    executions = read_table(options.executions, "executions")
+    trajectories = read_table(options.trajectories, "trajectories")
+    safety = execution_numbers.unsafe(trajectories, read_table(options.parameters, "parameters"))
+    films = [film(pair, path, executions, options.demonstrated) for pair, path in options.films]
+    save([execution_page.pictures(films), execution_page.rates(executions, safety)], options.pages)
+    write_gif(options.film, films)
+    demonstrated = tuple(options.demonstrated.split("/"))
+    write_json(options.numbers, execution_numbers.numbers(executions, safety, demonstrated))
+
+
+def film(pair: str, path: Path, executions: "pd.DataFrame", demonstrated: str) -> "Film":
+    """Return the film of a pair, with the counts of the execution that it shows."""
+    from pipeline.report.execution_page import Film
+
+    arrays = read_arrays(path)
+    held, target = pair.split("/")
+    row = executions[
+        (executions["held_object"] == held)
+        & (executions["target_object"] == target)
+        & (executions["features"] == "label_mapping")
+        & (executions["draw"] == int(arrays["draw"]))
+    ].iloc[0]
+    title = f"{held.replace('_', ' ')} into\n{target.replace('_', ' ')}"
+    if pair == demonstrated:
+        title += "\n(demonstrated)"
+    caption = f"{row.n_in_target} of {row.n_balls} balls in the target, {row.n_spilled} beside it"
+    return Film(title, caption, arrays["images"], float(arrays["every_s"]), float(row.first_drop_s))
+
+
+def write_gif(path: Path, films: "list[Film]") -> None:
+    """Write the films side by side, two in a row, as an animated GIF; the shorter ones wait at their end."""
+    from PIL import Image
+
+    length = max(len(film.images) for film in films)
+    frames = [
+        Image.fromarray(_mosaic([film.images[min(number, len(film.images) - 1)] for film in films]))
+        for number in range(length)
+    ]
+    width = _WIDTH_PX * min(len(films), 2)
+    height = round(frames[0].height * width / frames[0].width)
+    # One palette for all frames: no flicker, and a smaller file.
+    small = [frame.resize((width, height), Image.Resampling.LANCZOS) for frame in frames]
+    palette = small[length // 2].quantize(128)
+    indexed = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in small]
+    with replacing(path) as temporary:
+        indexed[0].save(
+            temporary,
+            save_all=True,
+            append_images=indexed[1:],
+            duration=round(1000.0 * films[0].every_s),
+            loop=0,
+        )
+
+
+def _mosaic(images: list[np.ndarray]) -> np.ndarray:
+    columns = min(len(images), 2)
+    blank = np.full_like(images[0], 255)
+    filled = [*images, *([blank] * (-len(images) % columns))]
+    rows = [np.concatenate(filled[k : k + columns], axis=1) for k in range(0, len(filled), columns)]
+    return np.concatenate(rows, axis=0)
+
+
+if __name__ == "__main__":
+    command.run(main)

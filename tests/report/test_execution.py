@@ -1,0 +1,81 @@
+"""Rates, intervals and safety of executions."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from pipeline.report import execution_numbers as numbers
+from pipeline.report import pairs
+from pipeline.report.execution_page import Film, pictures, rates
+
+
+def executions(pairs_successes, features="label_mapping", n=10):
+    rows = []
+    for (held, target), successes in pairs_successes.items():
+        for draw in range(n):
+            well = draw < successes
+            counts = {"n_balls": 105, "n_poured": 105, "n_spilled": 0 if well else 21, "n_refused": 1}
+            names = {"held_object": held, "target_object": target, "features": features, "draw": draw}
+            rows.append({**names, **counts, "success": well, "cause": "" if well else "aim", "fits": True})
+    return pd.DataFrame(rows)
+
+
+def test_wilsons_interval_is_the_tabled_one():
+    assert numbers.wilson(10, 10) == pytest.approx((0.7225, 1.0), abs=1e-4)
+    assert numbers.wilson(5, 10) == pytest.approx((0.2366, 0.7634), abs=1e-4)
+
+
+def test_intervals_take_a_pair_for_one_observation():
+    split = executions({("a", "b"): 10, ("c", "d"): 0})
+    even = executions({("a", "b"): 5, ("c", "d"): 5})
+    assert numbers.clustered(split) == (0.0, 1.0)
+    assert numbers.clustered(even) == (0.5, 0.5)
+
+
+def test_a_pairs_row_counts_successes_refusals_and_causes():
+    row = numbers.by_pair(executions({("a", "b"): 8})).iloc[0]
+    assert (row["n"], row["successes"], row["causes"]) == (10, 8, "aim 2")
+    assert row["refused_share"] == pytest.approx(0.5)
+    assert row["spilled_share"] == pytest.approx(2 * 21 / 1050)
+
+
+def trajectory(x_m, tilt_rad, draw=0):
+    frame = pd.DataFrame({"lip_x_m": x_m, "lip_y_m": 0.0, "tilt_rad": tilt_rad, "draw": draw})
+    return frame.assign(held_object="cup", target_object="bowl", features="standard")
+
+
+def test_a_tilt_above_its_reference_outside_the_opening_is_unsafe_on_the_way_in_or_back():
+    parameters = pd.DataFrame(
+        {
+            "object": ["cup", "bowl"],
+            "mapping": "label_mapping",
+            "radius_m": [0.03, 0.05],
+            "tilt_reference_rad": [1.0, 0.4],
+        }
+    )
+    x_m = np.array([-0.2, -0.06, -0.02, -0.02, -0.07])
+    runs = [
+        trajectory(x_m, [0.0, 0.9, 1.2, 2.0, 0.5]),
+        trajectory(x_m, [0.0, 0.9, 1.2, 2.0, 1.5], 1),
+        trajectory(x_m, [0.0, 1.1, 1.2, 2.0, 0.5], 2),
+        trajectory(x_m, [0.0, 0.5, 0.8, 0.8, 0.5], 3),
+    ]
+    row = numbers.unsafe(pd.concat(runs), parameters).iloc[0]
+    assert (row["way_in"], row["ever"]) == (0.25, 0.5)
+
+
+def test_pages_are_drawn_of_any_number_of_pairs_and_sets():
+    both = pd.concat(
+        [executions({("a", "b"): 9, ("c", "b"): 3}, name) for name in ("label_mapping", "standard")]
+    )
+    safety = both[["held_object", "target_object", "features"]].drop_duplicates().assign(way_in=0.1, ever=0.5)
+    assert len(rates(both, safety).axes) == 3
+    film = Film("a into\nb", "105 of 105", np.zeros((5, 4, 6, 3), np.uint8), 0.1, 0.2)
+    assert len(pictures([film, film]).axes) == 6
+    maps = pairs.maps(both)
+    shown = maps.axes[0].images[0].get_array()
+    assert shown[0, 1] == pytest.approx(100 * 21 / 1050)  # one of ten spilled 21 of 105
+    assert shown.mask[1, 1]
+    found = pairs.numbers(both)
+    assert found["pairs.standard.fit.success"] == pytest.approx(0.6)
+    assert found["pairs.standard.fit.failed.aim"] == 8
