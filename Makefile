@@ -16,6 +16,8 @@ SYSTEM_LIBRARIES := libegl1 libgl1 libgomp1 libusb-1.0-0
 # pybullet has wheels up to Python 3.11; on 3.12 pip compiles it and needs g++.
 PYTHONS := python3.11 python3.12 python3
 TYPED := src
+# Tests run as the workflow's jobs do, one thread each: two processes with two threads each wait for each other most of the time.
+ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 
 .PHONY: all test lint setup format track mlflow-server FORCE
 .DELETE_ON_ERROR:
@@ -27,7 +29,7 @@ reports/%: $(STAMP) FORCE
 	$(BIN)/snakemake -c$(CORES) $@
 
 test: lint
-	$(BIN)/python -m pytest -n $(CORES) --dist loadscope
+	$(ONE_THREAD) $(BIN)/python -m pytest -n $(CORES) --dist loadscope
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

@@ -1,5 +1,6 @@
 """Noisy samples of the demonstration objects' true surfaces, for stages that work on clouds."""
 
+import sys
 from functools import cache
 
 import numpy as np
@@ -33,3 +34,11 @@ def browser():
     """Headless Chromium."""
     with chromium() as started:
         yield started
+
+
+@pytest.fixture(autouse=True)
+def _no_figure_stays_open():
+    """Close what a test drew: pyplot keeps its figures, and warns of too many."""
+    yield
+    if "matplotlib.pyplot" in sys.modules:
+        sys.modules["matplotlib.pyplot"].close("all")

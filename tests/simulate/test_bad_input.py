@@ -86,7 +86,7 @@ def test_a_failed_trial_is_neither_trained_nor_tested_on(violent, tmp_path, monk
     artefacts.write_table(tmp_path / "r.parquet", pd.DataFrame(rims).assign(z_m=0.06), "tilt_references")
     words = ["--experiment", "pouring", "--trials", violent, "--samples", SAMPLES, "--draws", 2]
     words += ["--parameters", tmp_path / "p.parquet", "--tilt-references", tmp_path / "r.parquet"]
-    for name in ("predictions", "scores", "curves"):
+    for name in ("predictions", "scores", "curves", "replicates"):
         words += [f"--{name}", tmp_path / f"{name}.parquet"]
     monkeypatch.setattr(sys, "argv", ["classify", *map(str, words)])
     classify.main()

@@ -1,11 +1,13 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from warp.bodies import cloud, iou, moved
 
+from pipeline.parametrise.cloud import warped
 from pipeline.parametrise.parameters import evaluate
 from pipeline.warp.clouds import Cloud, Mapped
 from pipeline.warp.nearest import agreeing_neighbours, majority_of_neighbours
@@ -81,17 +83,13 @@ def test_parameters_scale_with_the_object(scale, yaw_rad):
 
 def read_off(mapped: Mapped) -> dict[str, float]:
     body = mapped.cloud
+    table = pd.DataFrame(
+        np.hstack([body.points_m, body.normals]), columns=["x_m", "y_m", "z_m", "nx", "ny", "nz"]
+    )
     container, rim = body.parts[:, 0], body.parts[:, 1]
-    pieces = {
-        "points_m": body.points_m,
-        "container_m": body.points_m[container],
-        "container_normals": body.normals[container],
-        "container_area_m2": body.area_m2[container],
-        "rim_m": body.points_m[rim],
-        "hull_points": 1000,
-    }
+    table = table.assign(area_m2=body.area_m2, container=container, rim=rim, valid=True)
     names = ("radius_m", "height_m", "volume_m3", "capacity_m3")
-    values = evaluate(names, pieces)
+    values = evaluate(names, warped(table, name="body").pieces(hull_points=1000))
     return {name: values[name] for name in names}
 
 
