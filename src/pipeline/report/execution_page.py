@@ -83,9 +83,7 @@ def rates(executions: "pd.DataFrame", safety: "pd.DataFrame") -> "Figure":
         axes[0].invert_yaxis()
         axes[0].set_xlabel("executions that succeeded, %\n(bars: 95 %, Wilson)")
         axes[1].set_xlabel("balls beside the target,\n% of those in the cup")
-        axes[2].set_xlabel(
-            "executions tilted above the reference\nwith the lip outside, % (open: way back too)"
-        )
+        axes[2].set_xlabel("tilted above the reference,\nlip outside, % of executions\n(open: way back, too)")
         for axis in axes:
             axis.set_xlim(-4, 104)
             axis.grid(axis="y", lw=0.3, color="0.85")
