@@ -1,5 +1,6 @@
 """The logged classifiers say what the fitted ones say: loaded, and served over HTTP."""
 
+import contextlib
 import json
 import os
 import signal
@@ -89,9 +90,11 @@ def test_it_is_served(tracked):
         "--workers",
         "1",
     ]
+    # As with the environment active: MLflow starts uvicorn by its name.
+    path = os.pathsep.join([os.path.dirname(sys.executable), os.environ["PATH"]])
     server = subprocess.Popen(
         [sys.executable, "-m", "mlflow", *words],
-        **{"env": os.environ | {"MLFLOW_TRACKING_URI": f"sqlite:///{tracked}/mlflow.db"}},
+        **{"env": os.environ | {"MLFLOW_TRACKING_URI": f"sqlite:///{tracked}/mlflow.db", "PATH": path}},
         **{"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True},
     )
     models = [fitted("mug", "label_mapping", draw)[0] for draw in range(2)]
@@ -102,7 +105,9 @@ def test_it_is_served(tracked):
                 answer = _ask(port, rows)
             except urllib.error.URLError:
                 time.sleep(0.5)
+        assert answer is not None, f"the server ended with {server.returncode}"
     finally:
-        os.killpg(server.pid, signal.SIGTERM)
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(server.pid, signal.SIGTERM)
         server.wait()
     assert np.allclose(answer, ensemble(models).predict_proba(rows), atol=1e-9)
