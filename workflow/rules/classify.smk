@@ -29,6 +29,7 @@ rule classify:
         "logs/classify/{experiment}.log",
     benchmark:
         "benchmarks/classify/{experiment}.tsv"
+    priority: 1
     threads: 1
     params:
         options=options("classify", "samples", "draws", *CLASSIFY, "resamples", "seed"),

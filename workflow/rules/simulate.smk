@@ -41,6 +41,8 @@ rule simulate_pouring:
         "logs/simulate/pouring/{object}.log",
     benchmark:
         "benchmarks/simulate/pouring/{object}.tsv"
+    # The longest jobs begin as soon as they can: what is short fills the gaps that they leave.
+    priority: 2
     threads: 1
     params:
         shared=options("simulate", "engine", "device", "ranges", "seed"),
@@ -61,6 +63,7 @@ rule simulate_filling:
         "logs/simulate/filling/{object}.log",
     benchmark:
         "benchmarks/simulate/filling/{object}.tsv"
+    priority: 1
     threads: 1
     params:
         # The order of the cups decides which one a trial draws.

@@ -11,12 +11,14 @@ _DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
 
 
 class Code:
-    """The package below `source` (the folder that holds `pipeline/`), each file read at most once."""
+    """The package below `source` (the folder that holds `pipeline/`), each file read and looked through at most once."""
 
     def __init__(self, source: str | Path) -> None:
         """Take the folder that holds the package."""
         self.source = Path(source)
         self._trees: dict[Path, ast.Module] = {}
+        self._texts: dict[str, bytes] = {}
+        self._imported: dict[str, set[str]] = {}
 
     def hash(self, *entries: str) -> str:
         """Return a hash of what `python -m entry` runs for each of `entries`.
@@ -27,7 +29,7 @@ class Code:
         digest = hashlib.sha256()
         modules = self.modules(*entries)
         for name in modules:
-            digest.update(f"{name}\n{ast.dump(self._tree(name))}\n".encode())
+            digest.update(self._text(name))
         for path in sorted(path for name in modules for path in self._assets(name)):
             digest.update(f"{path.relative_to(self.source)}\n".encode() + path.read_bytes())
         return digest.hexdigest()[:16]
@@ -68,7 +70,17 @@ class Code:
                 ) from error
         return self._trees[file]
 
+    def _text(self, name: str) -> bytes:
+        if name not in self._texts:
+            self._texts[name] = f"{name}\n{ast.dump(self._tree(name))}\n".encode()
+        return self._texts[name]
+
     def _imports(self, name: str) -> set[str]:
+        if name not in self._imported:
+            self._imported[name] = self._named(name)
+        return self._imported[name]
+
+    def _named(self, name: str) -> set[str]:
         package = name if self._file(name).name == "__init__.py" else name.rpartition(".")[0]
         named = {name}
         for node in ast.walk(self._tree(name)):
