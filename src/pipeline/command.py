@@ -34,7 +34,7 @@ def say(message: str) -> None:
     sys.stderr.flush()
 
 
-def progress(items: Iterable[T], total: int, what: str, every_s: float = 10.0) -> Iterator[T]:
+def progress(items: Iterable[T], total: int, what: str, every_s: float = 5.0) -> Iterator[T]:
     """Yield `items` with a bar on a terminal, and in a log with a line every few seconds: how many, the rate, the time left."""
     if sys.stderr.isatty():
         from tqdm import tqdm
@@ -48,6 +48,25 @@ def progress(items: Iterable[T], total: int, what: str, every_s: float = 10.0) -
             said, rate = now, done / (now - start)
             say(f"{what}: {done}/{total} ({rate:.1f}/s, {(total - done) / rate:.0f} s left)")
         yield item
+
+
+def steps(what: str, total: int, every_s: float = 5.0) -> Callable[[str], None]:
+    """Return what is told each step of a task when it begins; a log has a line when a few seconds have passed since the last."""
+    begun = 0
+    start = said = time.monotonic()
+
+    def tell(step: str) -> None:
+        nonlocal begun, said
+        begun, now = begun + 1, time.monotonic()
+        if sys.stderr.isatty() or now - said >= every_s:
+            said = now
+            say(f"{what}: {step} (step {begun} of {total}, {now - start:.0f} s so far)")
+
+    return tell
+
+
+def untold(step: str) -> None:
+    """Tell nothing of a step: what functions that take `steps` do by default."""
 
 
 def name_and_path(text: str) -> tuple[str, Path]:

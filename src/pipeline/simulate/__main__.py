@@ -87,7 +87,10 @@ def _options() -> argparse.Namespace:
 def _prepare(options: argparse.Namespace) -> None:
     from pipeline.simulate import prepared
 
-    ready = prepared.container(options.object, *artefacts.read_mesh(options.mesh), options.spacing_m)
+    tell = command.steps(f"preparing {options.object}", 4)
+    mesh = artefacts.read_mesh(options.mesh)
+    ready = prepared.container(options.object, *mesh, options.spacing_m, tell=tell)
+    tell("liquid at rest at every level")
     artefacts.write_arrays(options.container, prepared.to_arrays(ready))
 
 
