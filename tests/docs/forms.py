@@ -24,10 +24,17 @@ MADE_BY = {
     "reports/pairs.pdf": EXECUTED,
     "reports/physics.pdf": "report/test_physics.py::test_the_pages_are_the_same_bytes_for_the_same_rows",
     "reports/ablations.pdf": "report/test_evaluation.py::test_ablations_are_compared_with_the_default_replicate_by_replicate",
-    "reports/sources.pdf": "workflow/test_dag.py::test_the_page_on_sources_is_made",
+    "reports/sources.pdf": "report/test_sources.py::test_the_page_has_every_error_in_its_unit_and_names_who_was_annotated",
     'reports/metrics.json --config "warp={method: cpd}"': "warp/test_methods.py::test_labels_arrive_and_no_wall_is_crossed",
     'reports/metrics.json --config "warp={refinements: 0, bends: 0}"': ALL,
 }
+
+
+def looked_up(command: str) -> str:
+    """Return a check that a program is there and knows the options that are used: importing what it measures takes long."""
+    program, *options = command.split()[1:]
+    checks = [f"grep -q '\"{option}\"' {program}" for option in options if option.startswith("--")]
+    return " && ".join([f"test -f {program}", *checks])
 
 
 def helped(command: str) -> str:
@@ -79,11 +86,11 @@ FORMS = (
     ),
     Form(
         r"python benchmarks/liquid\.py.*",
-        helped,
+        looked_up,
         "benchmarks/test_liquid.py::test_the_benchmark_of_the_liquid_runs_and_its_pour_is_true",
     ),
     # Measurements of minutes, and what installs: no test runs these as they are printed.
-    Form(r"python benchmarks/(fusion|bullet|engines|primitives)\.py.*", helped, None),
+    Form(r"python benchmarks/(fusion|bullet|engines|primitives)\.py.*", looked_up, None),
     Form(r"python -m pipeline\.execute\.teacher", helped, None),
     Form(r"pip install .*", lambda text: text.replace("install", "install --help >/dev/null #"), None),
 )

@@ -65,8 +65,8 @@ def test_what_is_predicted_is_what_was_simulated(project):
         [predictor.pouring("wide_bowl", fill_m3=fill, tilt_rad=tilt).probability for fill, tilt in asked]
     )
     poured = trials["poured"].to_numpy()
-    assert p[poured].mean() > 0.7
-    assert p[~poured].mean() < 0.35
+    assert p[poured].mean() > 0.5 > p[~poured].mean()
+    assert p[poured].mean() - p[~poured].mean() > 0.35
 
 
 def test_a_filling_is_predicted_by_classifiers_of_the_object_that_is_named(project):
@@ -104,7 +104,7 @@ def test_every_object_is_shown_as_it_was_scanned_and_measured(project, name):
         (("show", "short_cups"), "did you mean 'short_cup'?"),
         (("view", "mug", "wide_bol"), "did you mean 'wide_bowl'?"),
         (("annotate", "mugg"), "did you mean 'mug'?"),
-        (("show", "tall_cup"), "run: snakemake -c2 data/processed/fuse/tall_cup/mesh.ply"),
+        (("show", "tall_cup"), "run: snakemake -c2 data/processed/fuse/tall_cup/fusion.json"),
     ],
 )
 def test_mistakes_end_with_one_sentence_and_exit_code_1(project, words, said):

@@ -128,7 +128,7 @@ rule execute_film:
     shell:
         "python -m pipeline.execute.film --held {wildcards.held}={input.held:q} --target {wildcards.target}={input.target:q}"
         " --parameters {input.parameters:q} --trajectories {input.trajectories:q} --balls-film {input.balls:q}"
-        " --film {output.film:q} > {log:q} 2>&1"
+        " --film {output.film:q} 2>&1 | tee {log:q} >&2"
 
 
 rule demonstrate:
