@@ -1,4 +1,7 @@
-"""The documentation site: `make docs` builds it into build/docs; it needs no network, neither to be built nor to be read."""
+"""The documentation site: `make docs` builds it into build/docs; it needs no network, neither to be built nor to be read.
+
+By Sphinx, with pages in Markdown: MkDocs and its Material theme are no longer maintained, their successor Zensical is not at 1.0.
+"""
 
 import sys
 from pathlib import Path

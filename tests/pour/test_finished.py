@@ -76,6 +76,10 @@ def test_a_filling_is_predicted_by_classifiers_of_the_object_that_is_named(proje
     assert set(own["features"]) == {"tilt", "fill", "second_fill", "height", "along", "across"}
     assert own["features"] == other["features"]
     assert own["probability"] != other["probability"]
+    radius_m = own["parameters"]["second"]["radius_m"]
+    assert own["variables"]["abs_dx_m"] == radius_m
+    assert "fill" in own["beyond"]  # the trials' cups hold ten particles
+    assert "fill" not in _json(project, *words[:2], "--fill", "20ml", *words[4:])["beyond"]
     point = _json(project, *words, "--mapping", "point_mapping")
     assert point["parameters"]["second"] != own["parameters"]["second"]
 
