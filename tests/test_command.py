@@ -1,5 +1,8 @@
 """What a log is told while something takes long."""
 
+import threading
+import time
+
 from pipeline import command
 
 
@@ -10,17 +13,19 @@ def test_a_log_has_how_many_the_rate_and_the_time_left(capsys):
     assert all(line.endswith(" s left)") and "/s, " in line for line in said)
 
 
-def test_a_log_has_the_steps_of_one_piece_of_work(capsys):
-    tell = command.steps("fusing mug", 2, every_s=0.0)
-    tell("reading")
-    tell("the surface")
-    first, second = capsys.readouterr().err.splitlines()
-    assert first.startswith("fusing mug: reading (step 1 of 2, ")
-    assert second.startswith("fusing mug: the surface (step 2 of 2, ")
+def test_a_log_has_the_step_that_takes_long(capsys):
+    before = threading.active_count()
+    with command.steps("fusing mug", 3, every_s=0.02) as tell:
+        tell("reading")
+        tell("the surface")
+        while not (said := capsys.readouterr().err):
+            time.sleep(0.01)
+    assert said.startswith("fusing mug: the surface (step 2 of 3, 0 s so far)\n")
+    assert threading.active_count() == before
 
 
 def test_what_is_quick_says_nothing(capsys):
-    tell = command.steps("fusing mug", 1)
-    tell("reading")
+    with command.steps("fusing mug", 1) as tell:
+        tell("reading")
     assert list(command.progress(range(1000), 1000, "numbers")) == list(range(1000))
     assert capsys.readouterr().err == ""

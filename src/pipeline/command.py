@@ -2,8 +2,10 @@
 
 import argparse
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
@@ -50,19 +52,24 @@ def progress(items: Iterable[T], total: int, what: str, every_s: float = 5.0) ->
         yield item
 
 
-def steps(what: str, total: int, every_s: float = 5.0) -> Callable[[str], None]:
-    """Return what is told each step of a task when it begins; a log has a line when a few seconds have passed since the last."""
-    begun = 0
-    start = said = time.monotonic()
+@contextmanager
+def steps(what: str, total: int, every_s: float = 5.0) -> Iterator[Callable[[str], None]]:
+    """Yield what is told each step of a long task when it begins; a line every few seconds says which one is at work."""
+    begun: list[str] = []
+    start, over = time.monotonic(), threading.Event()
 
-    def tell(step: str) -> None:
-        nonlocal begun, said
-        begun, now = begun + 1, time.monotonic()
-        if sys.stderr.isatty() or now - said >= every_s:
-            said = now
-            say(f"{what}: {step} (step {begun} of {total}, {now - start:.0f} s so far)")
+    def remind() -> None:
+        while not over.wait(every_s):
+            for step in begun[-1:]:
+                say(f"{what}: {step} (step {len(begun)} of {total}, {time.monotonic() - start:.0f} s so far)")
 
-    return tell
+    reminder = threading.Thread(target=remind, daemon=True)
+    reminder.start()
+    try:
+        yield begun.append
+    finally:
+        over.set()
+        reminder.join()
 
 
 def untold(step: str) -> None:

@@ -24,7 +24,8 @@ def main() -> None:
     from pipeline.fuse.fusion import fused
 
     how = {"voxel_m": o.voxel_m, "truncation_m": o.truncation_m, "n_points": o.points, "seed": o.seed}
-    result = fused(o.raw, **how, tell=steps(f"fusing {o.raw.name}", 4))
+    with steps(f"fusing {o.raw.name}", 4) as tell:
+        result = fused(o.raw, **how, tell=tell)
     for complaint in result.complaints:
         say(f"{o.raw}: {complaint}")
     outputs.write(result, o.mesh, o.cloud, o.report)

@@ -51,7 +51,7 @@ def fused(
     tell("reading")
     raw = layouts.read(folder)
     if isinstance(raw, layouts.DroppedMesh):
-        tell("the mesh")
+        tell("mending and measuring the mesh")
         vertices, triangles, T_object_world, facts = dropped.read(raw, rng)
         every = np.ones(len(vertices), bool)
         surface = tsdf.Surface(vertices, triangles, every, ~every)
