@@ -3,6 +3,7 @@
 #   make reports/roc.pdf   the figure, from whatever is in data/raw (CORES=8 make … for more than two cores)
 #   make all               everything that the workflow makes
 #   make test              lint, then every test
+#   make docs              the documentation site, build/docs/index.html
 #   make setup             .venv alone
 #   make track             record in MLflow the calls that it lacks
 #   make mlflow-server     a team's MLflow on PostgreSQL, until Ctrl-C (SERVER="--host 0.0.0.0 --allowed-hosts …" make …)
@@ -19,7 +20,7 @@ TYPED := src
 # Tests run as the workflow's jobs do, one thread each: two processes with two threads each wait for each other most of the time.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 
-.PHONY: all test lint setup format track mlflow-server FORCE
+.PHONY: all test lint docs setup format track mlflow-server FORCE
 .DELETE_ON_ERROR:
 
 all: $(STAMP)
@@ -36,6 +37,10 @@ lint: $(STAMP)
 	$(BIN)/ruff format --check .
 	$(BIN)/snakefmt --check --line-length 110 Snakefile workflow
 	$(BIN)/mypy $(TYPED)
+
+docs: $(STAMP)
+	$(BIN)/sphinx-build -W --keep-going -q docs build/docs
+	@echo "build/docs/index.html"
 
 format: $(STAMP)
 	$(BIN)/ruff check --fix .

@@ -2,8 +2,10 @@
 
 import argparse
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
@@ -34,7 +36,7 @@ def say(message: str) -> None:
     sys.stderr.flush()
 
 
-def progress(items: Iterable[T], total: int, what: str, every_s: float = 10.0) -> Iterator[T]:
+def progress(items: Iterable[T], total: int, what: str, every_s: float = 5.0) -> Iterator[T]:
     """Yield `items` with a bar on a terminal, and in a log with a line every few seconds: how many, the rate, the time left."""
     if sys.stderr.isatty():
         from tqdm import tqdm
@@ -48,6 +50,30 @@ def progress(items: Iterable[T], total: int, what: str, every_s: float = 10.0) -
             said, rate = now, done / (now - start)
             say(f"{what}: {done}/{total} ({rate:.1f}/s, {(total - done) / rate:.0f} s left)")
         yield item
+
+
+@contextmanager
+def steps(what: str, total: int, every_s: float = 5.0) -> Iterator[Callable[[str], None]]:
+    """Yield what is told each step of a long task when it begins; a line every few seconds says which one is at work."""
+    begun: list[str] = []
+    start, over = time.monotonic(), threading.Event()
+
+    def remind() -> None:
+        while not over.wait(every_s):
+            for step in begun[-1:]:
+                say(f"{what}: {step} (step {len(begun)} of {total}, {time.monotonic() - start:.0f} s so far)")
+
+    reminder = threading.Thread(target=remind, daemon=True)
+    reminder.start()
+    try:
+        yield begun.append
+    finally:
+        over.set()
+        reminder.join()
+
+
+def untold(step: str) -> None:
+    """Tell nothing of a step: what functions that take `steps` do by default."""
 
 
 def name_and_path(text: str) -> tuple[str, Path]:

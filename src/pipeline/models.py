@@ -4,7 +4,7 @@ A feature is α/α_r: a variable of the trial over a parameter of one of its con
 the classifiers of an experiment as one JSON file, `classify/<experiment>/models.json`; nothing in it is code.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,7 @@ EXPERIMENT_FEATURES = {
     "filling": ("tilt", "fill", "second_fill", "height", "along", "across"),
 }
 TERMS = ("linear", "quadratic")
+FAR = 3.0  # standard deviations from the mean of a training set
 
 
 def expanded(standardised: np.ndarray, terms: str) -> np.ndarray:
@@ -135,6 +136,17 @@ def chosen(models: Iterable[Model], features: str, training_object: str | None =
             "name one of these"
         )
     return found
+
+
+def beyond(models: Sequence[Model], values: np.ndarray) -> dict[str, tuple[float, float]]:
+    """Return the features of one question (1, F) that lie further from the trials that were learnt from than `FAR` deviations.
+
+    With mean and standard deviation of these trials, means over the classifiers.
+    """
+    mean, std = (np.mean([getattr(model, what) for model in models], axis=0) for what in ("mean", "std"))
+    far = np.abs(np.ravel(values) - mean) > FAR * std
+    told = zip(models[0].feature_names, mean.tolist(), std.tolist(), far, strict=True)
+    return {name: (middle, spread) for name, middle, spread, is_far in told if is_far}
 
 
 def mean_probability(models: Iterable[Model], values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

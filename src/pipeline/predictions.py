@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pipeline.artefacts import read_table
 from pipeline.errors import PipelineError
-from pipeline.models import Model, chosen, mean_probability, read_models
+from pipeline.models import Model, beyond, chosen, mean_probability, read_models
 
 PARAMETERS = ("tilt_reference_rad", "volume_m3", "height_m", "radius_m", "capacity_m3")
 MAPPINGS = ("label_mapping", "point_mapping")
@@ -17,6 +17,7 @@ class Prediction:
     """Probability of pouring or filling: mean and standard deviation over the classifiers, and what they were asked.
 
     `features` are α/α_r by name, `variables` the α and `parameters` those of the containers `held` and `second`, in SI units.
+    `beyond` has the features that are far from all that was learnt from, with its mean and standard deviation.
     """
 
     experiment: str
@@ -26,6 +27,7 @@ class Prediction:
     training_object: str
     mapping: str
     features: dict[str, float]
+    beyond: dict[str, tuple[float, float]]
     variables: dict[str, float]
     parameters: dict[str, dict[str, float]]
 
@@ -96,6 +98,7 @@ class Predictor:
             training_object=self._training_object,
             mapping=self._mapping,
             features=dict(zip(models[0].feature_names, map(float, values[0]), strict=True)),
+            beyond=beyond(models, values),
             variables=variables,
             parameters=dict(parameters),
         )

@@ -62,8 +62,16 @@ def test_predict_says_what_the_classifiers_say(project, capsys):
     ]
     assert (found["probability"], found["spread"]) == pytest.approx((np.mean(one), np.std(one)))
     assert found["parameters"]["held"] == VALUES
+    assert found["beyond"] == {}
     main(["predict", "mug", "--fill", "60%", "--tilt", "45", "--project", str(project)])
     assert f"pours with probability {np.mean(one):.2f}" in capsys.readouterr().out
+
+
+def test_what_nothing_was_learnt_of_is_said(project, capsys):
+    main(["predict", "mug", "--fill", "60%", "--tilt", "180", "--project", str(project)])
+    said = capsys.readouterr().out  # the trials' tilts are 0.8 ± 0.4
+    assert f"beyond what was learnt: tilt of {math.pi / 0.8:.2f}, trials had 0." in said
+    assert "fill of" not in said
 
 
 @pytest.mark.parametrize(

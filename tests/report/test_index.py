@@ -27,6 +27,13 @@ NUMBERS = {
     "classify.pouring.label_mapping.novel.auc": 0.98,
     "classify.pouring.label_mapping.novel.tpr_at_fpr_01": 0.8,
     "classify.pouring.standard.novel.auc": 0.9,
+    "classify.filling.standard.novel.auc": 0.75,
+    "classify.filling.standard.same.auc": 0.85,
+    "evaluation.filling.standard.novel.auc.low": 0.699,
+    "evaluation.filling.standard.novel.auc.high": 0.854,
+    "evaluation.filling.standard.same.auc.low": 0.876,
+    "evaluation.filling.standard.same.auc.high": 0.912,
+    "classify.filling.standard.novel.tpr_at_fpr_01": 0.07,
     "evaluation.pouring.label_mapping.novel.auc.low": 0.97,
     "evaluation.pouring.label_mapping.novel.auc.high": 0.985,
     "simulate.pouring.trials": 2000,
@@ -106,7 +113,7 @@ def page(folder):
     return (folder / "index.html").as_uri()
 
 
-@pytest.mark.parametrize(("width", "scheme"), [(360, "light"), (1280, "dark")])
+@pytest.mark.parametrize(("width", "scheme"), [(320, "light"), (390, "light"), (1280, "dark")])
 def test_a_browser_shows_it_without_complaint_network_or_sideways_scrolling(browser, page, width, scheme):
     with opened(browser, page, width, 740, color_scheme=scheme) as tab:
         tab.page.wait_for_selector("body[data-ready]")
@@ -223,6 +230,8 @@ def test_numbers_are_said_with_their_intervals_and_claims_with_their_answers():
     first, second = claims(CLAIMS)
     assert (first["value"], first["interval"], first["holds"]) == ("0.070", "0.050 to 0.090", True)
     assert (second["value"], second["interval"], second["why"]) == ("−0.020", "", "Too few trials.")
+    (tiny,) = claims([CLAIMS[0] | {"value": -0.00012, "low": -0.0007, "high": 0.0}])
+    assert (tiny["value"], tiny["interval"]) == ("−0.00012", "−0.001 to 0.000")
     told = {one["what"]: one for one in headlines(NUMBERS)}
     assert told["trials with liquid"]["value"] == "2,000"
     assert told["trials with liquid"]["beside"] == "3 particles through a wall"
@@ -231,20 +240,19 @@ def test_numbers_are_said_with_their_intervals_and_claims_with_their_answers():
 
 def test_parameters_are_those_of_the_label_mapping_in_readable_units(folder):
     jug, mug = rows(folder, "mug", NAMES, None, NUMBERS)
-    assert [one["value"] for one in mug["parameters"]][:2] == ["40.0", "40.0"]
+    assert [one["value"] for one in mug["parameters"]][:2] == ["40.00", "40.00"]
     assert (jug["source"], mug["source"]) == (False, True)
     assert (jug["poured"], mug["poured"]) == (None, 0.6)
     assert mug["scan"]["seen"] == "90%"
 
 
-def test_uncertainties_are_said_to_two_digits_of_their_own(folder, tmp_path):
-    table = pd.DataFrame(
-        {"object": ["mug"] * 2, "mapping": "label_mapping", "parameter": ["radius_m", "volume_m3"]}
-    )
-    table = table.assign(value=0.04, std=[0.000123, 0.0000021], unit="m")
+def test_uncertainties_are_said_to_the_decimals_of_their_column(folder, tmp_path):
+    names = ["radius_m", "volume_m3", "height_m"]
+    table = pd.DataFrame({"object": ["mug"] * 3, "mapping": "label_mapping", "parameter": names})
+    table = table.assign(value=0.04, std=[0.000123, 0.0000021, 0.0], unit="m")
     write_table(tmp_path / "uncertainties.parquet", table, "uncertainties")
     jug, mug = rows(folder, "mug", NAMES, tmp_path / "uncertainties.parquet", NUMBERS)
-    assert [one["std"] for one in mug["parameters"]] == ["0.12", "", "2.1", "", ""]
+    assert [one["std"] for one in mug["parameters"]] == ["0.12", "< 0.01", "2.1", "", ""]
     assert [one["value"] for one in mug["parameters"]][:1] == ["40.00"]
     assert not any(one["std"] for one in jug["parameters"])
 

@@ -1,5 +1,6 @@
 """A copy of the project in which the workflow really runs: once for all tests, then a copy of the finished state for each."""
 
+import fcntl
 import os
 import re
 import shutil
@@ -87,13 +88,21 @@ def fresh(tmp_path) -> Project:
     return new_project(tmp_path / "project")
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def finished(tmp_path_factory) -> Project:
-    """Return the project after one call; shared, so only to be read."""
-    project = new_project(tmp_path_factory.mktemp("finished"))
-    told = project.call()
-    assert told.returncode == 0, told.stdout
-    return project
+    """Return the project after one call; shared by all processes that test, so only to be read."""
+    base = tmp_path_factory.getbasetemp()
+    base = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+    folder, done = base / "finished", base / "finished.done"
+    with (base / "finished.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # until it is closed: who comes second waits
+        if not done.exists():
+            shutil.rmtree(folder, ignore_errors=True)
+            folder.mkdir()
+            told = new_project(folder).call()
+            assert told.returncode == 0, told.stdout
+            done.touch()
+    return Project(folder)
 
 
 @pytest.fixture

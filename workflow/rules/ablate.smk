@@ -221,4 +221,4 @@ rule ablate:
     shell:
         "python -m pipeline.classify --experiment {wildcards.experiment} --trials {input.trials:q} --parameters {input.parameters:q}"
         " --tilt-references {input.tilt_references:q} --replicates {output.replicates:q} --scores {output.scores:q}"
-        " {params.options} {params.draws} {params.meshes} {params.clouds} > {log:q} 2>&1"
+        " {params.options} {params.draws} {params.meshes} {params.clouds} 2>&1 | tee {log:q} >&2"

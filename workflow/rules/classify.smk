@@ -42,7 +42,7 @@ rule classify:
         "python -m pipeline.classify --experiment {wildcards.experiment} --trials {input.trials:q} --parameters {input.parameters:q}"
         " --tilt-references {input.tilt_references:q} --predictions {output.predictions:q} --scores {output.scores:q}"
         " --curves {output.curves:q} --models {output.models:q} --replicates {output.replicates:q} --pairs {output.pairs:q}"
-        " {params.options} {params.meshes} {params.clouds} > {log:q} 2>&1"
+        " {params.options} {params.meshes} {params.clouds} 2>&1 | tee {log:q} >&2"
 
 
 rule classify_learning:

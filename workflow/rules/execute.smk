@@ -49,7 +49,7 @@ rule execute:
     shell:
         "python -m pipeline.execute --held {wildcards.held}={input.held:q} --target {wildcards.target}={input.target:q}"
         " --parameters {input.parameters:q} --primitives {params.primitives} --demonstration {input.pair:q}"
-        " --attempts-table {output.attempts:q} --trajectories {output.trajectories:q} {params.options} > {log:q} 2>&1"
+        " --attempts-table {output.attempts:q} --trajectories {output.trajectories:q} {params.options} 2>&1 | tee {log:q} >&2"
 
 
 rule execute_balls:
@@ -128,7 +128,7 @@ rule execute_film:
     shell:
         "python -m pipeline.execute.film --held {wildcards.held}={input.held:q} --target {wildcards.target}={input.target:q}"
         " --parameters {input.parameters:q} --trajectories {input.trajectories:q} --balls-film {input.balls:q}"
-        " --film {output.film:q} > {log:q} 2>&1"
+        " --film {output.film:q} 2>&1 | tee {log:q} >&2"
 
 
 rule demonstrate:

@@ -29,4 +29,4 @@ rule fuse:
         code=code("pipeline.fuse"),
     shell:
         "python -m pipeline.fuse --raw {params.raw:q} --mesh {output.mesh:q} --cloud {output.cloud:q} --report {output.report:q}"
-        " {params.options} > {log:q} 2>&1"
+        " {params.options} 2>&1 | tee {log:q} >&2"

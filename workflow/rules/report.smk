@@ -91,7 +91,7 @@ rule report_evaluation:
     shell:
         "python -m pipeline.report.evaluation --replicates {input.replicates:q} --pairs {input.pairs:q} --learning {input.learning:q}"
         " --scores {input.scores:q} --predictions {input.predictions:q} --fillings {input.fillings:q} --page {output.page:q}"
-        " --numbers {output.numbers:q} {params.options} > {log:q} 2>&1"
+        " --numbers {output.numbers:q} {params.options} 2>&1 | tee {log:q} >&2"
 
 
 rule report_ablations:
@@ -335,4 +335,4 @@ rule index:
     shell:
         "python -m pipeline.report.index --processed {params.processed:q} --source {params.source} --objects {params.objects}"
         " --numbers {input.numbers:q} --figures {input.figures:q} --scans {input.scans:q} {params.simulate} {params.classify}"
-        " --uncertainties {input.uncertainties:q} --output {output.page:q} > {log:q} 2>&1"
+        " --uncertainties {input.uncertainties:q} --output {output.page:q} 2>&1 | tee {log:q} >&2"

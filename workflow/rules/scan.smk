@@ -26,4 +26,4 @@ rule scan:
         code=code("pipeline.scan"),
     shell:
         "python -m pipeline.scan --object {wildcards.object} --raw {params.raw:q} --truth {params.truth:q} {params.options}"
-        " > {log:q} 2>&1"
+        " 2>&1 | tee {log:q} >&2"

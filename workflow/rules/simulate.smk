@@ -29,7 +29,7 @@ rule simulate_container:
         code=code("pipeline.simulate.prepared"),
     shell:
         "python -m pipeline.simulate prepare --object {wildcards.object} --mesh {input.mesh:q} --container {output.container:q}"
-        " {params.options} > {log:q} 2>&1"
+        " {params.options} 2>&1 | tee {log:q} >&2"
 
 
 rule simulate_pouring:

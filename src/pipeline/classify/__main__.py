@@ -26,7 +26,8 @@ def main() -> None:
     names = [str(name) for name in pd.unique(given.trials["object"])]
     resampled = Resampled(names, object_weights(len(names), options.resamples, options.seed))
     results = Results(resampled, keep_predictions=options.predictions is not None)
-    evaluate(given.trials, given.labels, given.feature_sets, protocol, results)
+    told = f"training sets, {options.experiment}"
+    evaluate(given.trials, given.labels, given.feature_sets, protocol, results, told)
     ceiling(given.trials, given.labels, results)
     head = {"experiment": options.experiment, "samples": protocol.samples}
     write_table(options.scores, pd.DataFrame(results.scores), "scores")

@@ -33,7 +33,7 @@ def main() -> None:
     names = [str(name) for name in pd.unique(given.trials["object"])]
     weights = object_weights(len(names), options.resamples, options.seed)
     sizes, tables = sorted(options.learning_samples), []
-    for samples in command.progress(sizes, len(sizes), f"learning {options.experiment}"):
+    for samples in sizes:
         protocol = replace(inputs.protocol(options), samples=samples, draws=options.learning_draws)
         tables.append(_point(given, protocol, Resampled(names, weights)))
     write_table(options.learning, pd.concat(tables).assign(experiment=options.experiment), "learning")
@@ -46,7 +46,8 @@ def _point(given: inputs.Inputs, protocol: "Protocol", resampled: "Resampled") -
     from pipeline.classify.protocol import Results, evaluate
 
     results = Results(resampled, keep_predictions=False)
-    evaluate(given.trials, given.labels, given.feature_sets, protocol, results)
+    told = f"sets of {protocol.samples} trials, {given.trials['experiment'].iloc[0]}"
+    evaluate(given.trials, given.labels, given.feature_sets, protocol, results, told)
     fits = pd.DataFrame(results.scores).drop_duplicates(["features", "training_object", "draw"])
     told = fits.groupby("features").agg(
         separable_share=("separable", "mean"),

@@ -10,6 +10,7 @@ import pandas as pd
 
 from pipeline.classify.regression import FPR_GRID, Score, classifier, iterations, score, separable
 from pipeline.classify.trained import trained
+from pipeline.command import progress
 from pipeline.errors import PipelineError
 from pipeline.models import Model
 from pipeline.statistics.resampling import Resampled
@@ -94,13 +95,16 @@ def evaluate(
     feature_sets: dict[str, np.ndarray],
     protocol: Protocol,
     results: Results,
+    told: str = "",
 ) -> None:
     """Train and test every feature set on every object: `trials` (N rows), labels (N,), features (N, F) each.
 
-    All feature sets see the same draws. The draws of an object depend on its name and the seed alone.
+    All feature sets see the same draws. The draws of an object depend on its name and the seed alone. `told`: what progress is
+    called, none when empty.
     """
     experiment = str(trials["experiment"].iloc[0])
-    for drawn in training_sets(trials, labels, protocol):
+    sets, total = training_sets(trials, labels, protocol), trials["object"].nunique() * protocol.draws
+    for drawn in progress(sets, total, told) if told else sets:
         for features, values in feature_sets.items():
             fitted, training = fit(values[drawn.rows], labels[drawn.rows], protocol, drawn.n_redrawn)
             results.models.append(trained(fitted, experiment, features, drawn, protocol, training))

@@ -4,7 +4,6 @@ Writes what the arm did, and which trajectories were refused before it moved. Wh
 """
 
 import argparse
-import itertools
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -39,7 +38,7 @@ def main() -> None:
         task = pairs.task(parameters, features, *names, demonstrated)
         sample = _sampler(path, parameters, features, options)
         head = {"held_object": names[0], "target_object": names[1], "features": features}
-        for attempt, done in _executed(options, task, sample):
+        for attempt, done in _executed(options, task, sample, f"{names[0]} into {names[1]}, {features}"):
             attempts.append({**head, **attempt})
             if done is not None:
                 trajectories.append(done.assign(**head))
@@ -85,7 +84,7 @@ def _demonstrated(path: Path) -> tuple[str, str]:
 
 
 def _executed(
-    options: argparse.Namespace, task: "Task", sample: Sample
+    options: argparse.Namespace, task: "Task", sample: Sample, what: str
 ) -> "Iterator[tuple[Row, pd.DataFrame | None]]":
     """Yield what there is to say about each sample (draw, attempt), and what the arm did if it could follow it."""
     from pipeline.execute import containers, following
@@ -96,19 +95,19 @@ def _executed(
     # What really is where: the containers' own rims.
     lip_m = containers.lip_m(options.held[1], task.yaw_rad)
     own = Task(lip_m, task.yaw_rad, containers.opening_m(options.target[1]))
-    done = None
     with Cell(cup, second, task.T_world_second, T_cup_flange(cup, task.yaw_rad)) as cell:
-        for draw, attempt in itertools.product(range(options.draws), range(options.attempts)):
-            if attempt and done is not None:
-                continue
-            wanted = sample(draw, attempt)
-            plan, done, off_m = following.plan(cell, task.cup_poses(wanted)), None, np.nan
-            if not plan.refused:
-                poses = following.follow(cell, plan.q_rad)
-                off_m = float(np.abs(task.trajectory(poses)[:, :3] - wanted[:, :3]).max())
-                done = _table(poses, own, task.T_world_second).assign(draw=draw)
-            said = {"draw": draw, "attempt": attempt, "refused": plan.refused, "off_plan_m": off_m}
-            yield {**said, "duration_s": (len(wanted) - 1) * following.PLAN_S}, done
+        for draw in command.progress(range(options.draws), options.draws, what):
+            for attempt in range(options.attempts):
+                wanted = sample(draw, attempt)
+                plan, done, off_m = following.plan(cell, task.cup_poses(wanted)), None, np.nan
+                if not plan.refused:
+                    poses = following.follow(cell, plan.q_rad)
+                    off_m = float(np.abs(task.trajectory(poses)[:, :3] - wanted[:, :3]).max())
+                    done = _table(poses, own, task.T_world_second).assign(draw=draw)
+                said = {"draw": draw, "attempt": attempt, "refused": plan.refused, "off_plan_m": off_m}
+                yield {**said, "duration_s": (len(wanted) - 1) * following.PLAN_S}, done
+                if done is not None:
+                    break
 
 
 def _sampler(path: Path, parameters: "pd.DataFrame", features: str, options: argparse.Namespace) -> Sample:

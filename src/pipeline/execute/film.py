@@ -98,7 +98,9 @@ def main() -> None:
     with Cell(cup, second, T_world_second, T_cup_flange(cup, yaw_rad)) as cell:
         q, _ = kinematics.path(cell, T_world_held @ inverse(cell.T_flange_cup))
         studio = Studio(cell, cup, second, int(film["counts"].max()), float(film["radius_m"]))
-        for number, there in enumerate(balls):
+        for number, there in enumerate(
+            command.progress(balls, len(balls), f"filming {' into '.join(names)}")
+        ):
             cell.pose_arm(q[min(round(number * float(film["every_s"]) / PLAN_S), len(q) - 1)])
             images.append(studio.image(T_world_second, there))
     same = {name: film[name] for name in ("every_s", "draw")}

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from pipeline.command import parser, run, say
+from pipeline.command import parser, run, say, steps
 
 
 def main() -> None:
@@ -23,7 +23,9 @@ def main() -> None:
     from pipeline.fuse import outputs
     from pipeline.fuse.fusion import fused
 
-    result = fused(o.raw, voxel_m=o.voxel_m, truncation_m=o.truncation_m, n_points=o.points, seed=o.seed)
+    how = {"voxel_m": o.voxel_m, "truncation_m": o.truncation_m, "n_points": o.points, "seed": o.seed}
+    with steps(f"fusing {o.raw.name}", 4) as tell:
+        result = fused(o.raw, **how, tell=tell)
     for complaint in result.complaints:
         say(f"{o.raw}: {complaint}")
     outputs.write(result, o.mesh, o.cloud, o.report)

@@ -1,5 +1,6 @@
 """From a raw folder to the surface, the cloud and the report of what was found."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.artefacts import Mesh
+from pipeline.command import untold
 from pipeline.errors import PipelineError
 from pipeline.fuse import coverage, dropped, layouts, recorded, tsdf
 from pipeline.fuse.cloud import cloud
@@ -33,20 +35,33 @@ class Fused:
     complaints: tuple[str, ...] = ()
 
 
-def fused(folder: Path, *, voxel_m: float, truncation_m: float, n_points: int, seed: int) -> Fused:
-    """Fuse data/raw/<object>/; a `PipelineError` names the folder or file that is wrong."""
+def fused(
+    folder: Path,
+    *,
+    voxel_m: float,
+    truncation_m: float,
+    n_points: int,
+    seed: int,
+    tell: Callable[[str], None] = untold,
+) -> Fused:
+    """Fuse data/raw/<object>/; a `PipelineError` names the folder or file that is wrong. `tell` is told each step."""
     if n_points < LEAST_POINTS:
         raise PipelineError(f"--points: expected at least {LEAST_POINTS}, found {n_points}; set fuse.points")
     rng = np.random.default_rng(seed)
+    tell("reading")
     raw = layouts.read(folder)
     if isinstance(raw, layouts.DroppedMesh):
+        tell("mending and measuring the mesh")
         vertices, triangles, T_object_world, facts = dropped.read(raw, rng)
         every = np.ones(len(vertices), bool)
         surface = tsdf.Surface(vertices, triangles, every, ~every)
         return _result(surface, n_points, _SMOOTH_DROPPED, rng, facts | _mesh_facts(T_object_world, raw))
+    tell("poses, table and object")
     scan = recorded.located(raw, str(folder), rng)
+    tell("the surface")
     surface = tsdf.fuse(scan.views, scan.placement, voxel_m, truncation_m, str(folder))
     recorded.check_registered(scan, surface.vertices_m, surface.seen, str(folder))
+    tell("how well it fits, points on it")
     shares = coverage.shares_seen(surface)
     facts = scan.facts() | _residuals(scan, surface, str(folder), rng)
     facts |= {"seen": shares, "floor_closed_by_table_m2": surface.table_closed_m2}

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.ndimage import minimum_filter
 from scipy.spatial import cKDTree
 
+from pipeline.command import progress
 from pipeline.errors import PipelineError
 from pipeline.fuse import placement, tsdf
 from pipeline.fuse.agreement import projected
@@ -98,7 +99,8 @@ def _placed(stood: list[Levelled], views: Views, rng: np.random.Generator) -> tu
     cameras = list(zip(views.depths_m, views.intrinsics, strict=True))
     near, sure = ([_nearest(depth, K, edge) for depth, K in cameras] for edge in (EDGE_M, SURE_EDGE_M))
     poses, told = [np.eye(4)], np.zeros(len(stood))
-    for k in [*range(1, len(stood)), *range(1, len(stood))]:
+    turns = [*range(1, len(stood)), *range(1, len(stood))]
+    for k in progress(turns, len(turns), f"finding poses of {len(stood)} views: fits"):
         others = np.array([j for j in range(len(poses)) if j != k])
         asked = rng.choice(others, size=min(len(others), WITNESSES), replace=False)
         witnesses = [(stood[j].number, frames.inverse(poses[j] @ stood[j].T_level_camera)) for j in asked]

@@ -30,6 +30,7 @@ def options(parser: argparse.ArgumentParser) -> None:
         choices=("x", "y", "z", "-x", "-y", "-z"),
         help="axis of the file that points up; z when not given",
     )
+    parser.add_argument("--depth-scale", type=float, help="of depth images: their units a metre")
     parser.add_argument("--wall-mm", type=float, help="for a mesh without thickness")
     parser.add_argument("--on-table", action="store_true", help="the mesh or cloud holds its table, too")
     parser.add_argument("--notes", help="anything to remember")
@@ -90,7 +91,7 @@ def _copy(path: Path, folder: Path) -> None:
 
 def _describe(folder: Path, options: argparse.Namespace) -> None:
     """Write scan.yaml, with what a folder's own says where no option says otherwise."""
-    said = {key: getattr(options, key) for key in ("units", "up", "wall_mm", "notes")}
+    said = {key: getattr(options, key) for key in ("units", "up", "depth_scale", "wall_mm", "notes")}
     said |= {"on_table": True if options.on_table else None}
     said = {key: value for key, value in said.items() if value is not None}
     path = folder / "scan.yaml"
@@ -104,14 +105,20 @@ def _read(folder: Path, source: Path) -> dict:
     """Return what was found in the folder; errors name the user's own file and options instead of the copy."""
     import numpy as np
 
-    from pipeline.fuse import dropped, layouts
+    from pipeline.fuse import dropped, layouts, recorded
     from pipeline.fuse.raw import DroppedMesh
     from pipeline.geometry.cavity import cavity
 
     try:
         found = layouts.read(folder)
         if not isinstance(found, DroppedMesh):
-            return {"layout": found.layout, "n_views": found.n_found}
+            # Finding poses takes minutes; given ones are checked at once, and with them table and object.
+            left_out = (
+                recorded.located(found, str(folder), np.random.default_rng(0)).left_out
+                if found.T_world_cameras
+                else []
+            )
+            return {"layout": found.layout, "n_views": found.n_found, "views_left_out": left_out}
         vertices_m, triangles, _, facts = dropped.read(found, np.random.default_rng(0))
         capacity_m3 = cavity(vertices_m, triangles, name=str(folder)).capacity_m3
     except PipelineError as error:
@@ -127,13 +134,15 @@ def _told(message: str, folder: Path, source: Path) -> str:
     inner = source if source.is_dir() else source.parent
     message = re.sub(r"write `(\w+): (\S+)` into \S*scan\.yaml( beside it)?", r"give --\1 \2", message)
     message = re.sub(r"correct `(\w+)` in \S*scan\.yaml", r"correct --\1", message)
-    message = message.replace("--wall_mm", "--wall-mm").replace("--on_table true", "--on-table")
+    message = re.sub(r"--(wall_mm|on_table|depth_scale)", lambda found: found[0].replace("_", "-"), message)
+    message = message.replace("--on-table true", "--on-table")
     return message.replace(f"{folder}/", f"{inner}/").replace(str(folder), str(source))
 
 
 def text(result: dict) -> str:
     """Return the result in words."""
     what = f"{result['n_views']} views" if result["n_views"] else f"a {result['layout']}"
+    what += f", {len(result['views_left_out'])} of them left out" if result.get("views_left_out") else ""
     if "capacity_m3" in result:
         what += f", {result['height_m'] * 1e3:.0f} mm high, holds {result['capacity_m3'] * 1e6:.0f} ml"
     return f"{result['folder']}: {what}, layout {result['layout']}\nnext: snakemake -c2 reports/roc.pdf"

@@ -24,7 +24,10 @@ def options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--into", metavar="OBJECT", help="the container that is to be filled")
     parser.add_argument("--into-fill", default="0%", help="liquid in that container")
-    parser.add_argument("--along", default="0mm", help="lip from the centre of its opening, along the pour")
+    parser.add_argument(
+        "--along",
+        help="lip from the centre of its opening, along the pour; when not given, one radius of the opening",
+    )
     parser.add_argument("--across", default="0mm", help="and across the pour")
     parser.add_argument("--height", default="50mm", help="lip above the centre of its opening")
     parser.add_argument("--mapping", choices=MAPPINGS, default=MAPPINGS[0], help="whose parameters are used")
@@ -63,7 +66,9 @@ def _asked(predictor: Predictor, name: str, second: str | None, options: argpars
         second_fill_m3=volume_m3(
             options.into_fill, "--into-fill", predictor.parameters(second)["capacity_m3"]
         ),
-        along_m=length_m(options.along, "--along"),
+        along_m=length_m(options.along, "--along")
+        if options.along
+        else predictor.parameters(second)["radius_m"],
         across_m=length_m(options.across, "--across"),
         height_m=length_m(options.height, "--height"),
     )
@@ -80,6 +85,7 @@ def text(result: dict) -> str:
             f"{result['probability']:.2f} (± {result['spread']:.2f} over {result['n_classifiers']} classifiers "
             f"learnt from {result['training_object']})",
             *(f"  {line}" for line in _behind(result)),
+            *(f"  {line}" for line in _beyond(result)),
         ]
     )
 
@@ -107,6 +113,14 @@ def _behind(result: dict) -> list[str]:
     return [
         f"{what:<9}{value:>9} / {by + ' ' + reference:<28} = {result['features'][name]:.2f}"
         for name, (what, value, by, reference) in rows.items()
+    ]
+
+
+def _beyond(result: dict) -> list[str]:
+    """Return a line for each feature that the classifiers have seen nothing like."""
+    return [
+        f"beyond what was learnt: {name.replace('_', ' ')} of {result['features'][name]:.2f}, trials had {mean:.2f} ± {std:.2f}"
+        for name, (mean, std) in result["beyond"].items()
     ]
 
 

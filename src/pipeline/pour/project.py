@@ -5,6 +5,7 @@ from typing import Any
 
 from pipeline.errors import PipelineError
 from pipeline.workflow.configuration import nearest
+from pipeline.workflow.objects import sources
 
 
 class Project:
@@ -30,8 +31,8 @@ class Project:
             ) from error
 
     def source(self) -> str:
-        """Return the name of the annotated object."""
-        return str(self.config()["objects"]["source"])
+        """Return the name of the annotated object; of several, the first, which classifiers are learnt with."""
+        return sources(self.config())[0]
 
     def objects(self) -> list[str]:
         """Return the names of all objects that were scanned or dropped, in alphabetical order."""

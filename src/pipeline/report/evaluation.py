@@ -90,7 +90,8 @@ def _of_predictions(
         "calibrations": {},
         "values": {},
     }
-    for features, rows in novel.groupby("features", observed=True):
+    sets = list(novel.groupby("features", observed=True))
+    for features, rows in command.progress(sets, len(sets), f"calibration, {experiment}: feature sets"):
         curve = found["calibrations"][experiment, features] = by.calibration(rows, names, weights)
         name = f"evaluation.{experiment}.{features}.novel.calibration_error"
         found["numbers"] |= by.with_interval(name, curve["error"])

@@ -6,6 +6,7 @@ from zlib import crc32
 import numpy as np
 
 from pipeline.artefacts import replacing
+from pipeline.command import progress
 from pipeline.errors import PipelineError
 from pipeline.geometry import frames
 from pipeline.scan import camera
@@ -54,7 +55,7 @@ def views(
     sensor = camera.Noise(noise)
     return [
         (camera.depth_image(scene, pose, sensor, generator(seed, shape.name, 1 + i)), pose)
-        for i, pose in enumerate(poses)
+        for i, pose in enumerate(progress(poses, n, f"scanning {shape.name}: views"))
     ]
 
 

@@ -87,8 +87,12 @@ def _options() -> argparse.Namespace:
 def _prepare(options: argparse.Namespace) -> None:
     from pipeline.simulate import prepared
 
-    ready = prepared.container(options.object, *artefacts.read_mesh(options.mesh), options.spacing_m)
-    artefacts.write_arrays(options.container, prepared.to_arrays(ready))
+    mesh = artefacts.read_mesh(options.mesh)
+    with command.steps(f"preparing {options.object}", 4) as tell:
+        ready = prepared.container(options.object, *mesh, options.spacing_m, tell=tell)
+        tell("liquid at rest at every level")
+        arrays = prepared.to_arrays(ready)
+    artefacts.write_arrays(options.container, arrays)
 
 
 def _pouring(options: argparse.Namespace) -> list[dict]:

@@ -3,13 +3,14 @@
 Its cavity, its shape for Bullet, and the liquid's view of it: walls, calibration, states at rest at every level.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from pipeline.command import untold
 from pipeline.geometry.cavity import Cavity, Quadrature, cavity, quadrature, retained_volume_m3
 from pipeline.simulate import liquid
 from pipeline.simulate.containers import decimated, wall_pieces
@@ -68,11 +69,15 @@ def container(
     triangles: np.ndarray,
     spacing_m: float,
     engine: Engine = ENGINES["liquid"],
+    tell: Callable[[str], None] = untold,
 ) -> Container:
     """Prepare a fused mesh (V, 3), (F, 3) for trials; a `PipelineError` names the object if it cannot hold liquid."""
+    tell("its cavity")
     room = cavity(vertices_m, triangles, name=name)
     coarse = decimated(vertices_m, triangles)
+    tell("its walls, and how much it holds before it overflows")
     vessel = engine.prepare(room, *coarse, spacing_m)
+    tell("convex pieces of its wall")
     pieces = wall_pieces(vertices_m, triangles, room.opening_m)
     return Container(name, float(np.ptp(vertices_m[:, 2])), coarse, pieces, vessel, engine)
 

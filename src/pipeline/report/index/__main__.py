@@ -40,7 +40,10 @@ def main() -> None:
         figures=pictures(options.figures),
         scans=scans(options.scans),
         rows=rows(options.processed, options.source, names, options.uncertainties, numbers),
-        objects=[described(name, options.processed, options.source) for name in names],
+        objects=[
+            described(name, options.processed, options.source)
+            for name in command.progress(names, len(names), "page: objects")
+        ],
         source=options.source,
         settings=settings(options, numbers),
         runs=runs(),
@@ -54,7 +57,7 @@ def pictures(paths: Sequence[Path]) -> list[dict]:
     from pipeline.report.index.figures import FIGURES, images
 
     shown = []
-    for path in paths:
+    for path in command.progress(paths, len(paths), "page: figures"):
         title, caption = FIGURES.get(path.stem, (path.stem.replace("_", " ").capitalize(), ""))
         shown.append({"file": path.name, "title": title, "caption": caption, "pages": images(path)})
     return shown

@@ -40,12 +40,13 @@ FIGURES = {
     ),
     "promp": (
         "How was pouring shown?",
-        "Demonstrations as a probabilistic movement primitive, and what conditioning on a new object makes of it, as the "
-        "paper's Fig. 4.",
+        "Demonstrated pours and the probabilistic movement primitive that was learnt from them, as the paper's Fig. 4; a page a "
+        "feature set, by whose parameters all is divided.",
     ),
     "execution": (
         "Does the robot pour?",
-        "Pours that the simulated robot executed on novel objects, as the paper's Fig. 5.",
+        "Pours that the simulated robot executed with the demonstrated pair and with novel objects, as the paper's Fig. 5; how "
+        "often they succeeded is on the further page.",
     ),
     "physics": (
         "Is the liquid one?",

@@ -74,4 +74,5 @@ def claims(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _said(value: float) -> str:
-    return f"{value:.3f}".replace("-", "−")
+    decimals = 3 if value == 0 or abs(value) >= 0.0005 else 5
+    return f"{value:.{decimals}f}".replace("-", "−")

@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 MAPPING = "label_mapping"
 # Column of `parameters`: heading, unit, how many units one SI unit is, decimals.
 PARAMETERS = {
-    "radius_m": ("radius", "mm", 1e3, 1),
-    "height_m": ("height", "mm", 1e3, 1),
-    "volume_m3": ("hull", "ml", 1e6, 0),
-    "capacity_m3": ("capacity", "ml", 1e6, 0),
+    "radius_m": ("radius", "mm", 1e3, 2),
+    "height_m": ("height", "mm", 1e3, 2),
+    "volume_m3": ("hull", "ml", 1e6, 1),
+    "capacity_m3": ("capacity", "ml", 1e6, 1),
     "tilt_reference_rad": ("tilt reference", "°", 180 / math.pi, 1),
 }
 
@@ -58,15 +58,18 @@ def _spread(path: Path | None) -> dict[tuple[str, str], float]:
 
 def _parameter(key: str, value: float, std: float | None) -> dict[str, str]:
     heading, unit, scale, decimals = PARAMETERS[key]
-    known = std is not None and math.isfinite(std) and std > 0
-    # An uncertainty is said to two digits of its own, and the value no further.
-    digits = min(3, max(0, 1 - math.floor(math.log10(std * scale)))) if known and std else decimals
     return {
         "heading": heading,
         "unit": unit,
-        "value": f"{value * scale:.{digits}f}" if math.isfinite(value) else "–",
-        "std": f"{std * scale:.{digits}f}" if known and std else "",
+        "value": f"{value * scale:.{decimals}f}" if math.isfinite(value) else "–",
+        "std": "" if std is None or not math.isfinite(std) else _small(std * scale, decimals),
     }
+
+
+def _small(value: float, decimals: int) -> str:
+    """Return an uncertainty to as many decimals as its value has; what would be nothing is said to be less than the last one."""
+    least = 10.0**-decimals
+    return f"{value:.{decimals}f}" if value >= least / 2 else f"< {least:.{decimals}f}"
 
 
 def scan(fusion: dict[str, Any]) -> dict[str, str]:
