@@ -22,7 +22,10 @@ def main() -> None:
     parser.add_argument("--executions", type=Path, required=True)
     parser.add_argument("--trajectories", type=Path, required=True)
     parser.add_argument("--parameters", type=Path, required=True, help="warped parameters of all objects")
-    parser.add_argument("--demonstrated", required=True, help="the demonstrated pair, as held/target")
+    parser.add_argument(
+        "--safety", type=Path, required=True, help="of drawn trajectories, by the stage execute"
+    )
+    parser.add_argument("--demonstration", type=Path, required=True, help="pair.yaml of the demonstrations")
     parser.add_argument(
         "--films", nargs="+", required=True, type=command.name_and_path, metavar="HELD/TARGET=FILE"
     )
@@ -30,20 +33,24 @@ def main() -> None:
         parser.add_argument(name, type=Path, required=True)
     options = parser.parse_args()
 
+    from pipeline.motion.demonstrations import read_pair
     from pipeline.report import execution_numbers, execution_page
     from pipeline.report.style import save
 
+    shown = read_pair(options.demonstration)
+    demonstrated = shown["held_object"], shown["target_object"]
     executions = read_table(options.executions, "executions")
     trajectories = read_table(options.trajectories, "trajectories")
-    safety = execution_numbers.unsafe(trajectories, read_table(options.parameters, "parameters"))
-    films = [film(pair, path, executions, options.demonstrated) for pair, path in options.films]
-    save([execution_page.pictures(films), execution_page.rates(executions, safety)], options.pages)
+    executed = execution_numbers.unsafe(trajectories, read_table(options.parameters, "parameters"))
+    safety = execution_numbers.with_drawn(executed, read_table(options.safety, "safety"))
+    films = [film(pair, path, executions, demonstrated) for pair, path in options.films]
+    pages = [execution_page.pictures(films), execution_page.rates(executions, safety)]
+    save([*pages, execution_page.safety_table(safety)], options.pages)
     write_gif(options.film, films)
-    demonstrated = tuple(options.demonstrated.split("/"))
     write_json(options.numbers, execution_numbers.numbers(executions, safety, demonstrated))
 
 
-def film(pair: str, path: Path, executions: "pd.DataFrame", demonstrated: str) -> "Film":
+def film(pair: str, path: Path, executions: "pd.DataFrame", demonstrated: tuple[str, str]) -> "Film":
     """Return the film of a pair, with the counts of the execution that it shows."""
     from pipeline.report.execution_page import Film
 
@@ -56,7 +63,7 @@ def film(pair: str, path: Path, executions: "pd.DataFrame", demonstrated: str) -
         & (executions["draw"] == int(arrays["draw"]))
     ].iloc[0]
     title = f"{held.replace('_', ' ')} into\n{target.replace('_', ' ')}"
-    if pair == demonstrated:
+    if (held, target) == demonstrated:
         title += "\n(demonstrated)"
     caption = f"{row.n_in_target} of {row.n_balls} balls in the target, {row.n_spilled} beside it"
     return Film(title, caption, arrays["images"], float(arrays["every_s"]), float(row.first_drop_s))

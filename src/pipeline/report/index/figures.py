@@ -47,6 +47,11 @@ FIGURES = {
         "Does the robot pour?",
         "Pours that the simulated robot executed on novel objects, as the paper's Fig. 5.",
     ),
+    "watching": (
+        "Does it know when it pours?",
+        "What the classifiers say along each executed pour: the probability that the cup pours, and that what it pours ends in the "
+        "second container, against the first ball and the first drop of liquid.",
+    ),
     "physics": (
         "Is the liquid one?",
         "The simulated liquid against hydrostatics: density, level, capacity, spill angle and retained volume; the same trials "
