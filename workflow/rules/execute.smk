@@ -123,36 +123,44 @@ rule execute_film_balls:
         target=container_of("target"),
         trajectories=rules.execute.output.trajectories,
     output:
-        film=f"{PROCESSED}/execute/{{held}}/{{target}}/balls.npz",
+        film=f"{PROCESSED}/execute/{{held}}/{{target}}/{{features}}/balls.npz",
     log:
-        "logs/execute/{held}/{target}/film_balls.log",
+        "logs/execute/{held}/{target}/{features}/film_balls.log",
+    benchmark:
+        "benchmarks/execute/{held}/{target}/{features}/film_balls.tsv"
+    wildcard_constraints:
+        features="|".join(PRIMITIVES),
     threads: 1
     params:
         options=options("execute", "fill", "balls", "seed"),
         code=code("pipeline.simulate.filmed"),
     shell:
         "python -m pipeline.simulate.filmed --held {wildcards.held}={input.held:q} --target {wildcards.target}={input.target:q}"
-        " --trajectories {input.trajectories:q} --film {output.film:q} {params.options} > {log:q} 2>&1"
+        " --trajectories {input.trajectories:q} --features {wildcards.features} --film {output.film:q} {params.options} > {log:q} 2>&1"
 
 
 rule execute_film:
     input:
         held=container_of("held"),
         target=container_of("target"),
-        parameters=expand(rules.assemble_parameters.output, source=SOURCE),
         trajectories=rules.execute.output.trajectories,
         balls=rules.execute_film_balls.output.film,
     output:
-        film=f"{PROCESSED}/execute/{{held}}/{{target}}/film.npz",
+        film=f"{PROCESSED}/execute/{{held}}/{{target}}/{{features}}/film.npz",
+        gif=f"{PROCESSED}/execute/{{held}}/{{target}}/{{features}}/film.gif",
     log:
-        "logs/execute/{held}/{target}/film.log",
+        "logs/execute/{held}/{target}/{features}/film.log",
+    benchmark:
+        "benchmarks/execute/{held}/{target}/{features}/film.tsv"
+    wildcard_constraints:
+        features="|".join(PRIMITIVES),
     threads: 1
     params:
         code=code("pipeline.execute.film"),
     shell:
         "python -m pipeline.execute.film --held {wildcards.held}={input.held:q} --target {wildcards.target}={input.target:q}"
-        " --parameters {input.parameters:q} --trajectories {input.trajectories:q} --balls-film {input.balls:q}"
-        " --film {output.film:q} > {log:q} 2>&1"
+        " --trajectories {input.trajectories:q} --balls-film {input.balls:q}"
+        " --features {wildcards.features} --film {output.film:q} --gif {output.gif:q} > {log:q} 2>&1"
 
 
 rule demonstrate:
@@ -191,6 +199,15 @@ rule demonstrate_pair:
     shell:
         "python -m pipeline.execute.teacher --held {wildcards.held}={input.held:q} --target {wildcards.target}={input.target:q}"
         " --sees-the-pair --pours {params.pours} --output $(dirname {output.pair:q}) > {log:q} 2>&1"
+
+
+rule films:
+    input:
+        [
+            rules.execute_film.output.gif.format(held=held, target=target, features=features)
+            for held, target in PAIRS
+            for features in PRIMITIVES
+        ],
 
 
 # Every object into every other, when reports/pairs.pdf is asked for.

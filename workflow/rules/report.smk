@@ -264,7 +264,10 @@ rule report_execution:
         safety=rules.execute_safety.output.safety,
         pair=os.path.join(DEMONSTRATIONS, "pair.yaml"),
         parameters=expand(rules.assemble_parameters.output, source=SOURCE),
-        films=[rules.execute_film.output.film.format(held=held, target=target) for held, target in FILMED],
+        films=[
+            rules.execute_film.output.film.format(held=held, target=target, features="label_mapping")
+            for held, target in FILMED
+        ],
     output:
         pages=f"{REPORTS}/execution.pdf",
         film=f"{REPORTS}/execution.gif",
@@ -273,7 +276,7 @@ rule report_execution:
         "logs/report/execution.log",
     threads: 1
     params:
-        films=" ".join(f"{h}/{t}={PROCESSED}/execute/{h}/{t}/film.npz" for h, t in FILMED),
+        films=" ".join(f"{h}/{t}={PROCESSED}/execute/{h}/{t}/label_mapping/film.npz" for h, t in FILMED),
         code=code("pipeline.report.execution"),
     shell:
         "python -m pipeline.report.execution --executions {input.executions:q} --trajectories {input.trajectories:q}"

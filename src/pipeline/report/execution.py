@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipeline import command
-from pipeline.artefacts import read_arrays, read_table, replacing, write_json
+from pipeline.artefacts import read_arrays, read_table, write_film, write_json
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,17 +56,20 @@ def film(pair: str, path: Path, executions: "pd.DataFrame", demonstrated: tuple[
 
     arrays = read_arrays(path)
     held, target = pair.split("/")
-    row = executions[
+    rows = executions[
         (executions["held_object"] == held)
         & (executions["target_object"] == target)
         & (executions["features"] == "label_mapping")
         & (executions["draw"] == int(arrays["draw"]))
-    ].iloc[0]
+    ]
     title = f"{held.replace('_', ' ')} into\n{target.replace('_', ' ')}"
     if (held, target) == demonstrated:
         title += "\n(demonstrated)"
-    caption = f"{row.n_in_target} of {row.n_balls} balls in the target, {row.n_spilled} beside it"
-    return Film(title, caption, arrays["images"], float(arrays["every_s"]), float(row.first_drop_s))
+    caption, drop_s = "the arm could follow no sample", np.nan
+    for row in rows.itertuples():
+        caption = f"{row.n_in_target} of {row.n_balls} balls in the target, {row.n_spilled} beside it"
+        drop_s = float(row.first_drop_s)
+    return Film(title, caption, arrays["images"], float(arrays["every_s"]), drop_s)
 
 
 def write_gif(path: Path, films: "list[Film]") -> None:
@@ -79,19 +82,9 @@ def write_gif(path: Path, films: "list[Film]") -> None:
         for number in range(length)
     ]
     width = _WIDTH_PX * min(len(films), 2)
-    height = round(frames[0].height * width / frames[0].width)
-    # One palette for all frames: no flicker, and a smaller file.
-    small = [frame.resize((width, height), Image.Resampling.LANCZOS) for frame in frames]
-    palette = small[length // 2].quantize(128)
-    indexed = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in small]
-    with replacing(path) as temporary:
-        indexed[0].save(
-            temporary,
-            save_all=True,
-            append_images=indexed[1:],
-            duration=round(1000.0 * films[0].every_s),
-            loop=0,
-        )
+    size = width, round(frames[0].height * width / frames[0].width)
+    small = [np.asarray(frame.resize(size, Image.Resampling.LANCZOS)) for frame in frames]
+    write_film(path, small, films[0].every_s)
 
 
 def _mosaic(images: list[np.ndarray]) -> np.ndarray:
