@@ -30,12 +30,9 @@ class Film:
 
     def moments(self) -> list[np.ndarray]:
         """Return the pictures before, during and after the pour."""
+        flows_s, last = self.first_drop_s + _INTO_FLOW_S, len(self.images) - 1
         # Where nothing came out, the middle.
-        flows_s = self.first_drop_s + _INTO_FLOW_S if np.isfinite(self.first_drop_s) else np.inf
-        middle = len(self.images) // 2
-        during = (
-            min(int(flows_s / self.every_s) + 1, len(self.images) - 1) if np.isfinite(flows_s) else middle
-        )
+        during = min(int(flows_s / self.every_s) + 1, last) if np.isfinite(flows_s) else last // 2
         return [self.images[0], self.images[during], self.images[-1]]
 
 
