@@ -29,6 +29,7 @@ def task_space(
     parameters, rims: the tables `parameters` and `tilt_references`; they are needed where the files hold cup poses.
     """
     if not shown.poses or shown.target_pose is None:
+        checks.together(shown.files, shown.values)
         return list(shown.values)
     names = {"held_object": shown.held_object, "target_object": shown.target_object}
     rim = rims[(rims["object"] == shown.held_object) & (rims["mapping"] == mapping)]
@@ -46,6 +47,7 @@ def task_space(
         one = poses.trajectory(poses.matrices(recorded), rim_m, T_world_second, opening_m, name)
         checks.tilts(name, one[:, 3])
         found.append(one)
+    checks.together(shown.files, found)
     return found
 
 
