@@ -90,7 +90,9 @@ def test_a_pour_that_comes_from_beyond_or_ends_on_the_way_is_told():
     checks.together("abc", [one[:150] for one in whole])  # none is taken back
     with pytest.raises(PipelineError, match=r"^b: .* begins 0\.2\d* m beyond .* the other way round"):
         checks.together("abc", [whole[0], whole[1] * [-1.0, -1.0, 1.0, 1.0], whole[2]])
-    with pytest.raises(PipelineError, match=r"^c: .* as in a, found a recording that ends while it is tilted"):
+    with pytest.raises(
+        PipelineError, match=r"^c: .* as in a, found a recording that ends while it is tilted"
+    ):
         checks.together("abc", [*whole[:2], whole[2][:150]])
 
 

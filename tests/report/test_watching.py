@@ -16,7 +16,7 @@ def curve(draw, crosses_s, classifiers="label_mapping", fills=True):
     """p(pour) passes one half at a time; p(fill) is high or low from 0.5 s before on."""
     pour = 1.0 / (1.0 + np.exp(-8.0 * (T - crosses_s)))
     fill = np.where(crosses_s - 0.5 < T, 0.9 if fills else 0.2, 0.4)
-    return Curve(("cup", "bowl", "label_mapping", draw), classifiers, T, TILT, pour, fill)
+    return Curve(("cup", "bowl", "label_mapping", draw), classifiers, T, TILT, pour, fill, T < 2.2)
 
 
 def outcomes(*rows):
@@ -35,26 +35,28 @@ def test_leads_are_from_one_half_to_the_first_drop():
     told = numbers.numbers(found)
     assert told["watching.label_mapping.balls.not_foreseen"] == 0.5
     assert told["watching.label_mapping.balls.lead_s"] == pytest.approx(0.15, abs=0.02)
-    assert told["watching.label_mapping.balls.lead_s_off"] == pytest.approx(0.35, abs=0.02)
+    assert told["watching.label_mapping.balls.lead_s_between_objects"] == 0.0
 
 
 def test_an_alarm_is_pouring_that_is_likely_where_filling_is_not():
     shown = [curve(0, 2.0), curve(1, 2.0, fills=False), curve(2, 2.0, fills=False)]
     table = outcomes((0, 2.5, 0, np.nan), (1, 2.5, 9, 2.7), (2, 2.5, 0, np.nan))
     found = numbers.events(shown, {"liquid": table})
-    assert np.isnan(found["alarm_s"][0])
-    assert found["alarm_s"][1] == pytest.approx(2.0, abs=0.02)
+    assert np.isnan(found["unlikely_s"][0])
+    assert found["unlikely_s"][1] == pytest.approx(2.0, abs=0.02)
     told = numbers.numbers(found)
-    assert told["watching.label_mapping.liquid.alarm_before_the_spill"] == 1.0
-    assert told["watching.label_mapping.liquid.alarm_of_the_clean"] == 0.5
-    assert told["watching.label_mapping.liquid.alarm_lead_s"] == pytest.approx(0.7, abs=0.02)
+    assert told["watching.label_mapping.liquid.unlikely.before_the_spill"] == 1.0
+    assert told["watching.label_mapping.liquid.unlikely.of_the_clean"] == 0.5
+    assert told["watching.label_mapping.liquid.unlikely.lead_s"] == pytest.approx(0.7, abs=0.02)
+    assert found["outside_s"].tolist() == pytest.approx([2.0] * 3, abs=0.02)
+    assert told["watching.label_mapping.liquid.outside.of_the_clean"] == 1.0
     assert told["watching.label_mapping.liquid.p_fill_auc"] == 0.75
 
 
 def test_an_alarm_on_the_way_back_is_none():
     late = curve(0, 4.5, fills=False)
     (found,) = numbers.events([late], {"balls": outcomes((0, 3.9, 0, np.nan))}).to_dict("records")
-    assert np.isnan(found["alarm_s"])
+    assert np.isnan(found["unlikely_s"])
 
 
 def test_pages_are_drawn_of_any_number_of_pairs():

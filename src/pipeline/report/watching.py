@@ -53,8 +53,9 @@ def main() -> None:
     models = read_models(options.pouring) + read_models(options.filling)
     portion = Portion(options.held_particles * options.spacing_m**3, np.radians(options.tilt_deg))
     learnt = _watchers(models, parameters, trajectories, options.source, portion)
-    capacity_m3 = parameters[parameters["mapping"] == "label_mapping"].set_index("object")["capacity_m3"]
-    curves = watching_numbers.curves(trajectories, learnt, options.fill * capacity_m3)
+    warped = parameters[parameters["mapping"] == "label_mapping"].set_index("object")
+    fill_m3, radius_m = options.fill * warped["capacity_m3"], warped["radius_m"]
+    curves = watching_numbers.curves(trajectories, learnt, fill_m3, radius_m)
     events = watching_numbers.events(curves, outcomes)
     save([watching_page.moments(curves, outcomes), watching_page.leads(events)], options.pages)
     write_json(options.numbers, watching_numbers.numbers(events))

@@ -17,7 +17,7 @@ LIKELY = 0.5
 
 @dataclass(frozen=True)
 class Curve:
-    """p(pour) and p(fill) (T,) along one execution, by classifiers of one set; `execution`: its key, `moved_by` in it."""
+    """p(pour) and p(fill) (T,) along one execution, by classifiers of one set; outside (T,): the lip is not above the opening."""
 
     execution: tuple[str, str, str, int]
     classifiers: str
@@ -25,14 +25,16 @@ class Curve:
     tilt_rad: np.ndarray
     pour: np.ndarray
     fill: np.ndarray
+    outside: np.ndarray
 
 
 def curves(
     trajectories: pd.DataFrame,
     watchers: "Mapping[tuple[str, str, str], Watcher]",
     fill_m3: "pd.Series",
+    radius_m: "pd.Series",
 ) -> list[Curve]:
-    """Return a curve an execution and set of classifiers; fill_m3: what each held object had in it."""
+    """Return a curve an execution and set of classifiers; fill_m3, radius_m: of each object, what it held and its opening's."""
     found = []
     for key, run in trajectories.groupby(EXECUTION, sort=True):
         states = run[["lip_x_m", "lip_y_m", "lip_z_m", "tilt_rad"]].to_numpy(float)
@@ -40,15 +42,17 @@ def curves(
             if (held, target) == key[:2]:
                 pour, fill = watcher.along(states, fill_m3[held]).T
                 time = run["t_s"].to_numpy(float), states[:, 3]
-                found.append(Curve(key, classifiers, *time, pour, fill))
+                outside = np.hypot(states[:, 0], states[:, 1]) > radius_m[target]
+                found.append(Curve(key, classifiers, *time, pour, fill, outside))
     return found
 
 
 def events(found: list[Curve], outcomes: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """Return one row a curve and kind of contents: how long before the first drop p(pour) passed one half, and so on.
 
-    lead_s, lead_deg: positive where it passed before the drop; p_fill: at the first drop; alarm_s: when pouring was likely and
-    filling was not, for the first time while the cup still leaned further; clean: nothing came to lie beside the second.
+    lead_s, lead_deg: positive where it passed before the drop; p_fill: at the first drop; clean: nothing came to lie beside the
+    second. When pouring was likely for the first time, while the cup still leaned further, and filling was not (unlikely_s), or
+    the lip was outside the opening (outside_s).
     """
     rows = []
     for contents, table in outcomes.items():
@@ -64,12 +68,11 @@ def events(found: list[Curve], outcomes: Mapping[str, pd.DataFrame]) -> pd.DataF
 
 def _event(curve: Curve, outcome: pd.Series) -> dict[str, Any]:
     likely = np.flatnonzero(curve.pour > LIKELY)
-    alarm = np.flatnonzero((curve.pour > LIKELY) & (curve.fill < LIKELY))
-    alarm = alarm[alarm <= curve.tilt_rad.argmax()]
     found: dict[str, Any] = {
         "clean": outcome["n_spilled"] == 0,
         "spill_s": outcome["first_spill_s"],
-        "alarm_s": curve.t_s[alarm[0]] if len(alarm) else np.nan,
+        "unlikely_s": _alarm_s(curve, curve.fill < LIKELY),
+        "outside_s": _alarm_s(curve, curve.outside),
         **{"lead_s": np.nan, "lead_deg": np.nan, "p_fill": np.nan},
     }
     drop_s = outcome["first_drop_s"]
@@ -81,6 +84,12 @@ def _event(curve: Curve, outcome: pd.Series) -> dict[str, Any]:
             found["lead_s"] = drop_s - curve.t_s[first]
             found["lead_deg"] = np.degrees(tilt_at_drop - curve.tilt_rad[first])
     return found
+
+
+def _alarm_s(curve: Curve, bad: np.ndarray) -> float:
+    """Return when pouring was likely in a bad place for the first time; the way back with an empty cup is left out."""
+    alarm = np.flatnonzero((curve.pour > LIKELY) & bad)
+    return float(curve.t_s[alarm[0]]) if len(alarm) and alarm[0] <= curve.tilt_rad.argmax() else np.nan
 
 
 def numbers(rows: pd.DataFrame) -> dict[str, float]:
@@ -96,8 +105,9 @@ def numbers(rows: pd.DataFrame) -> dict[str, float]:
             low, median, high = np.quantile(values, [0.05, 0.5, 0.95])
             found |= {f"{key}.{name}": float(median), f"{key}.{name}_05": float(low)}
             found[f"{key}.{name}_95"] = float(high)
-            # Of how far off it is: over pairs, so that no pair counts more than another.
-            found[f"{key}.{name}_off"] = float(values.abs().groupby([part[n] for n in PAIR]).mean().mean())
+            # How differently they speak of different cups: of what they say of one, the median.
+            medians = values.groupby(part["held_object"]).median()
+            found[f"{key}.{name}_between_objects"] = float(medians.std(ddof=0))
         found |= {f"{key}.{name}": value for name, value in _spills(part).items()}
     return found
 
@@ -106,15 +116,16 @@ def _spills(part: pd.DataFrame) -> dict[str, float]:
     from sklearn.metrics import roc_auc_score
 
     found: dict[str, float] = {"clean": float(part["clean"].mean())}
-    alarmed = part["alarm_s"].notna()
     spilled, clean = part[~part["clean"]], part[part["clean"]]
-    if len(clean):
-        found["alarm_of_the_clean"] = float(alarmed[clean.index].mean())
-    if len(spilled):
-        lead_s = spilled["spill_s"] - spilled["alarm_s"]
-        found["alarm_before_the_spill"] = float((lead_s >= 0.0).mean())
-        if lead_s.notna().any():
-            found["alarm_lead_s"] = float(lead_s.median())
+    for alarm in ("unlikely", "outside"):
+        at_s = part[f"{alarm}_s"]
+        if len(clean):
+            found[f"{alarm}.of_the_clean"] = float(at_s[clean.index].notna().mean())
+        if len(spilled):
+            lead_s = spilled["spill_s"] - at_s[spilled.index]
+            found[f"{alarm}.before_the_spill"] = float((lead_s >= 0.0).mean())
+            if lead_s.notna().any():
+                found[f"{alarm}.lead_s"] = float(lead_s.median())
     known = part.dropna(subset=["p_fill"])
     if known["clean"].nunique() == 2:
         found["p_fill_auc"] = float(roc_auc_score(known["clean"], known["p_fill"]))
