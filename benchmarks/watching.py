@@ -1,6 +1,6 @@
 """How long a robot waits for an answer: p(pour) and p(fill) of one state, from the classifiers of the last run.
 
-    python benchmarks/watching.py            in the project's folder, after snakemake reports/roc.pdf
+python benchmarks/watching.py            in the project's folder, after snakemake reports/roc.pdf
 """
 
 import argparse
@@ -32,7 +32,9 @@ def main() -> None:
             one.watch(lip_m, tilt_rad, 2e-4)
             taken_us[number] = 1e6 * (time.perf_counter() - begun)
         slowest = np.quantile(taken_us, 0.999)
-        sys.stdout.write(f"{features:15} median {np.median(taken_us):6.1f} us, 99.9 % below {slowest:6.1f} us\n")
+        sys.stdout.write(
+            f"{features:15} median {np.median(taken_us):6.1f} us, 99.9 % below {slowest:6.1f} us\n"
+        )
 
 
 if __name__ == "__main__":

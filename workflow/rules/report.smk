@@ -194,6 +194,8 @@ rule report_primitives:
     input:
         primitives=expand(rules.primitives.output.primitive, source=SOURCE, features=FEATURE_SETS),
         trajectories=expand(rules.primitives.output.trajectories, source=SOURCE, features=FEATURE_SETS),
+        conditioned=[PRIMITIVES["conditioned"]] if SHOWN_PAIRS else [],
+        parameters=expand(rules.assemble_parameters.output, source=SOURCE),
     output:
         pages=f"{REPORTS}/promp.pdf",
         numbers=f"{REPORTS}/promp.json",
@@ -202,10 +204,17 @@ rule report_primitives:
     threads: 1
     params:
         options=options("primitives", "prior_demonstrations"),
+        # The first pairs that are executed.
+        conditioned=(
+            f"--conditioned {PRIMITIVES['conditioned']} --pairs {' '.join(config['execute']['pairs'][:4])}"
+            if SHOWN_PAIRS
+            else ""
+        ),
         code=code("pipeline.report.primitives"),
     shell:
         "python -m pipeline.report.primitives --primitives {input.primitives:q} --trajectories {input.trajectories:q}"
-        " --pages {output.pages:q} --numbers {output.numbers:q} {params.options} > {log:q} 2>&1"
+        " --pages {output.pages:q} --numbers {output.numbers:q} {params.options} --parameters {input.parameters:q} {params.conditioned}"
+        " > {log:q} 2>&1"
 
 
 rule report_physics:
