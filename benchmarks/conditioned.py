@@ -2,8 +2,8 @@
 
     python benchmarks/conditioned.py         in the project's folder, after snakemake reports/execution.pdf
 
-Share of the values of the left-out pair's pours in the 95 % bands, and how far the mean is from theirs when the lip is over the opening
-(phase 0.3 to 0.7), beside a primitive that is scaled by label mapping from one other pair (mean over these).
+Share of the values of the left-out pair's pours in the 95 % bands, and how far the mean is from theirs when the lip is over the
+opening (phase 0.3 to 0.7), beside a primitive that is scaled by label mapping from one other pair (mean over these).
 """
 
 import argparse
