@@ -109,7 +109,7 @@ def _sampler(primitive: "Primitive", seed: int) -> Sample:
     own = zlib.crc32("/".join(primitive.pair).encode())
 
     def sample(draw: int, attempt: int) -> np.ndarray:
-        return primitive.promp.sample(phase, np.random.default_rng([seed, own, draw, attempt]))
+        return primitive.samples(phase, 1, np.random.default_rng([seed, own, draw, attempt]))[0]
 
     return sample
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from pipeline.artefacts import read_json
@@ -15,11 +16,16 @@ from pipeline.motion.promp import ProMP
 
 @dataclass(frozen=True)
 class Primitive:
-    """promp: metres and radians in the frame of `task`; pair: held object, second container."""
+    """promp: its own units, times factors (4,) metres and radians in the frame of `task`; pair: held object, second container."""
 
     promp: ProMP
+    factors: np.ndarray
     task: Task
     pair: tuple[str, str]
+
+    def samples(self, phase: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
+        """Return trajectories (count, T, 4) in metres and radians: the same random numbers are alike for all feature sets."""
+        return self.factors * self.promp.samples(phase, count, rng)
 
 
 def read(
@@ -30,6 +36,8 @@ def read(
     if features == CONDITIONED:
         learnt = ConditionedProMP.from_json(content, str(path))
         promp = learnt.given(log_parameters(parameters, "label_mapping", *pair))
-        return Primitive(promp, pairs.task(parameters, "label_mapping", *pair, demonstrated), pair)
-    promp = ProMP.from_json(content, str(path)).scaled(scaling.factors(parameters, features, *pair))
-    return Primitive(promp, pairs.task(parameters, features, *pair, demonstrated), pair)
+        return Primitive(
+            promp, np.ones(4), pairs.task(parameters, "label_mapping", *pair, demonstrated), pair
+        )
+    promp, factors = ProMP.from_json(content, str(path)), scaling.factors(parameters, features, *pair)
+    return Primitive(promp, factors, pairs.task(parameters, features, *pair, demonstrated), pair)

@@ -72,7 +72,7 @@ def tilted_outside(
     from pipeline.motion import safety, scaling
 
     task = primitive.task
-    drawn = primitive.promp.samples(np.linspace(0.0, 1.0, safety.STEPS), samples, rng)
+    drawn = primitive.samples(np.linspace(0.0, 1.0, safety.STEPS), samples, rng)
     own = task.own(drawn, containers.lip_m(held, task.yaw_rad), containers.opening_m(target))
     radius_m, _, _, tilt_rad = scaling.factors(parameters, "label_mapping", *primitive.pair)
     way_in, ever = safety.unsafe(own, radius_m, tilt_rad)
