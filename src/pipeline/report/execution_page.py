@@ -61,7 +61,8 @@ def rates(executions: "pd.DataFrame", safety: "pd.DataFrame") -> "Figure":
     import matplotlib.pyplot as plt
 
     table = by_pair(executions).merge(safety, how="left", on=[*PAIR, "features"])
-    pairs = list(dict.fromkeys(zip(table["held_object"], table["target_object"], strict=True)))
+    # In the configuration's order.
+    pairs = list(dict.fromkeys(zip(safety["held_object"], safety["target_object"], strict=True)))
     with plt.rc_context(RC):
         figure, axes = plt.subplots(
             1, 3, figsize=(7.2, 1.2 + 0.42 * len(pairs)), sharey=True, layout="constrained"
