@@ -1,9 +1,9 @@
-"""The only reader and writer of the project's tables, meshes, arrays and JSON files: one schema a table, atomic writes."""
+"""The only reader and writer of the project's tables, meshes, arrays, films and JSON files: one schema a table, atomic writes."""
 
 import json
 import os
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -117,6 +117,20 @@ def read_arrays(path: str | Path) -> dict[str, np.ndarray]:
             return dict(file)
     except (OSError, ValueError, zipfile.BadZipFile) as error:
         raise PipelineError(f"{path}: expected arrays (NPZ), but it cannot be read: {error}") from error
+
+
+def write_film(path: str | Path, pictures: Sequence[np.ndarray], every_s: float) -> None:
+    """Write pictures (H, W, 3) of uint8, `every_s` apart, as an animated GIF that begins again at its end."""
+    from PIL import Image
+
+    frames = [Image.fromarray(picture) for picture in pictures]
+    # One palette for all frames: no flicker, and a smaller file.
+    palette = frames[len(frames) // 2].quantize(128)
+    indexed = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+    with replacing(path) as temporary:
+        indexed[0].save(
+            temporary, save_all=True, append_images=indexed[1:], duration=round(1000.0 * every_s), loop=0
+        )
 
 
 def points(frame: pd.DataFrame) -> np.ndarray:

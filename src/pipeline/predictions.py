@@ -105,10 +105,15 @@ class Predictor:
 
     def _of(self, experiment: str) -> list[Model]:
         if experiment not in self._models:
-            path = self._processed / "classify" / experiment / "models.json"
-            if not path.is_file():
-                raise PipelineError(
-                    f"{path}: expected the classifiers of a run, found none; run: snakemake -c2 reports/roc.pdf"
-                )
-            self._models[experiment] = read_models(path)
+            self._models[experiment] = classifiers(self._processed, experiment)
         return self._models[experiment]
+
+
+def classifiers(processed: str | Path, experiment: str) -> list[Model]:
+    """Return all classifiers that the last run learnt of an experiment, from the folder data/processed."""
+    path = Path(processed) / "classify" / experiment / "models.json"
+    if not path.is_file():
+        raise PipelineError(
+            f"{path}: expected the classifiers of a run, found none; run: snakemake -c2 reports/roc.pdf"
+        )
+    return read_models(path)

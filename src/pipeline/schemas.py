@@ -105,6 +105,13 @@ TABLES = {
         + _floats("duration_s", "off_plan_m", "fill_m3", "target_capacity_m3")
         + [("fits", pa.bool_()), ("success", pa.bool_()), *_strings("cause", "refused")]
     ),
+    # Shares of trajectories drawn from a primitive that tilt beyond the tilt reference while the lip is outside the opening: before
+    # it has come inside for the first time (way_in), at any time (ever).
+    "safety": pa.schema(
+        _strings("held_object", "target_object", "features")
+        + _integers("samples")
+        + _floats("way_in", "ever")
+    ),
     # Checks of the liquid; what x, measured and expected are is said at each check (simulate.measures, .convergence).
     "physics": pa.schema(
         _strings("check", "vessel")

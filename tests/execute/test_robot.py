@@ -71,6 +71,34 @@ def test_it_reaches_random_postures_and_says_when_it_cannot(cell):
     assert kinematics.solve(cell, wanted, READY_RAD, 300) is None
 
 
+def test_a_trajectory_of_another_lip_and_opening_is_the_same_motion():
+    rng = np.random.default_rng(3)
+    believed = Task(rng.normal(0, 0.05, 3), 1.1, rng.normal(0, 0.05, 3))
+    lip_m, opening_m = rng.normal(0, 0.05, (2, 3))
+    wanted = np.column_stack([rng.uniform(-0.3, 0.3, (20, 3)), np.linspace(0.0, 2.8, 20)])
+    there = Task(lip_m, believed.yaw_rad, opening_m)
+    seen = there.trajectory(believed.cup_poses(wanted), believed.T_world_second)
+    assert believed.own(wanted[None], lip_m, opening_m)[0] == pytest.approx(seen, abs=1e-12)
+
+
+def test_a_teacher_who_sees_the_demonstration_pair_means_what_was_shown():
+    shown, meant = teacher.DEMONSTRATED, teacher.seen(tube("cup", 0.036, 0.130), tube("bowl", 0.072, 0.055))
+    for name in ("start_m", "pour_m", "end_m"):
+        assert getattr(meant, name) == pytest.approx(getattr(shown, name), abs=0.002)
+    assert meant.carried_rad == pytest.approx(shown.carried_rad, abs=0.02)
+    one, two = (teacher.draw(np.random.default_rng(5), each) for each in (shown, meant))
+    assert np.abs(one - two).max() < 0.02
+
+
+def test_a_seen_pair_keeps_peoples_distances():
+    low, narrow = tube("cup", 0.030, 0.060), tube("mug", 0.040, 0.095)
+    meant = teacher.seen(low, narrow)
+    assert meant.pour_m == pytest.approx([-0.013, 0.0, 0.055])
+    assert meant.start_m == pytest.approx([-0.208, 0.0, 0.080])
+    assert teacher.seen(low, tube("egg cup", 0.020, 0.03)).pour_m[0] == 0.0
+    assert meant.carried_rad == pytest.approx(0.57 * np.pi / 4)
+
+
 def straight(start, end, seconds):
     share = np.linspace(0.0, 1.0, round(seconds / following.PLAN_S) + 1)[:, None]
     return TASK.cup_poses(np.array(start) + share * (np.array(end) - start))

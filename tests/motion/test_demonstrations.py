@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.errors import PipelineError
 from pipeline.geometry.frames import apply, rotation_about, transform
-from pipeline.motion import demonstrations, poses
+from pipeline.motion import checks, demonstrations, poses
 
 
 @pytest.fixture
@@ -45,6 +45,7 @@ MISTAKES = {
     "millimetres": (lambda t, v: (t, v * [1000.0, 1000.0, 1000.0, 1.0]), "millimetres"),
     "degrees": (lambda t, v: (t, v * [1.0, 1.0, 1.0, 180.0 / np.pi]), "degrees"),
     "milliseconds": (lambda t, v: (t * 1000.0, v), "milliseconds"),
+    "minutes": (lambda t, v: (t / 60.0, v), "is t_s in minutes"),
     "never": (lambda t, v: (t, v * [1.0, 1.0, 1.0, 0.01]), "never tilts"),
     "other way": (lambda t, v: (t, v * [1.0, 1.0, 1.0, -1.0]), "tilts the other way"),
     "jump": (_jump, "line 102: .* a jump of 0.3"),
@@ -81,6 +82,18 @@ def test_other_columns_and_empty_files_are_refused(folder):
     path.write_bytes(b"\xff\xfe\x00\x01" * 50)
     with pytest.raises(PipelineError, match=r"pour_00\.csv: expected"):
         demonstrations.read(folder)
+
+
+def test_a_pour_that_comes_from_beyond_or_ends_on_the_way_is_told():
+    whole = [pours.pour(seed)[1] for seed in range(3)]
+    checks.together("abc", whole)
+    checks.together("abc", [one[:150] for one in whole])  # none is taken back
+    with pytest.raises(PipelineError, match=r"^b: .* begins 0\.2\d* m beyond .* the other way round"):
+        checks.together("abc", [whole[0], whole[1] * [-1.0, -1.0, 1.0, 1.0], whole[2]])
+    with pytest.raises(
+        PipelineError, match=r"^c: .* as in a, found a recording that ends while it is tilted"
+    ):
+        checks.together("abc", [*whole[:2], whole[2][:150]])
 
 
 def test_one_demonstration_is_too_few(tmp_path):

@@ -1,5 +1,7 @@
 """Phases, scales, safety, and primitives given the objects."""
 
+import json
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -152,3 +154,20 @@ def test_conditioned_primitives_need_two_pairs_and_known_objects():
     assert context == pytest.approx(np.log([0.04, 0.12, 1.0, 1e-3, 0.08, 0.06]))
     with pytest.raises(PipelineError, match="vase"):
         conditioned.log_parameters(PARAMETERS, "label_mapping", "cup", "vase")
+
+
+def test_a_conditioned_primitive_that_was_written_is_the_same_and_a_mended_one_is_refused():
+    contexts, shown = _pairs(4, 3, 0)
+    learnt = ConditionedProMP.fit(list(shown), contexts)
+    content = json.loads(json.dumps(learnt.to_json()))
+    at, context = np.linspace(0.0, 1.0, 5), np.array([0.1, 0.2])
+    read = ConditionedProMP.from_json(content).given(context)
+    assert (read.mean(at) == learnt.given(context).mean(at)).all()
+    assert (read.covariance(at) == learnt.given(context).covariance(at)).all()
+    content["slope"] = content["slope"][:-1]
+    with pytest.raises(PipelineError, match=r"mine.json: expected slope of shape \(60, 2\)"):
+        ConditionedProMP.from_json(content, "mine.json")
+    with pytest.raises(
+        PipelineError, match=r"mine.json: expected a conditioned primitive with residual slope"
+    ):
+        ConditionedProMP.from_json(learnt.residual.to_json(), "mine.json")

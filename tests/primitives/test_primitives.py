@@ -10,6 +10,7 @@ import pytest
 from motion import pours
 
 from pipeline.artefacts import read_table, write_table
+from pipeline.motion.conditioned import ConditionedProMP, log_parameters
 from pipeline.motion.promp import ProMP
 from pipeline.report import primitives as report
 
@@ -74,6 +75,30 @@ def test_the_same_call_writes_the_same_bytes(outputs, tmp_path):
     assert _call(outputs, tmp_path).returncode == 0
     for name in ("promp.json", "demonstrations.parquet"):
         assert (tmp_path / name).read_bytes() == (outputs / FEATURES[0] / name).read_bytes()
+
+
+def test_several_pairs_give_a_primitive_that_knows_them_apart(inputs, tmp_path):
+    pair = "held_object: tall_cup\ntarget_object: tall_cup\n"
+    higher = [(t, values + [0.02, 0.0, 0.05, 0.0]) for t, values in map(pours.pour, range(10, 16))]
+    pours.write(inputs / "other", higher, pair)
+    words = ["--demonstrations", inputs / "shown", inputs / "other", "--primitive", tmp_path / "promp.json"]
+    words += ["--parameters", inputs / "parameters.parquet", "--tilt-references", inputs / "rims.parquet"]
+    call = [sys.executable, "-m", "pipeline.primitives.conditioned", *map(str, words)]
+    subprocess.run(call, check=True)
+    content = json.loads((tmp_path / "promp.json").read_text())
+    assert (content["learnt_from"]["pours"], content["learnt_from"]["pairs"][0]) == (16, "tall_cup/wide_bowl")
+    learnt = ConditionedProMP.from_json(content)
+    parameters = read_table(inputs / "parameters.parquet", "parameters")
+    at = np.linspace(0.0, 1.0, 50)
+    shown, other = (
+        learnt.given(log_parameters(parameters, "label_mapping", "tall_cup", name)).mean(at)
+        for name in ("wide_bowl", "tall_cup")
+    )
+    assert (other - shown)[:, 2] == pytest.approx(0.05, abs=0.02)
+    assert (other - shown).mean(axis=0)[:3] == pytest.approx([0.02, 0.0, 0.05], abs=0.01)
+    alone = subprocess.run([*call[:4], *call[5:]], capture_output=True, text=True)
+    assert alone.returncode == 1
+    assert "at least two pairs" in alone.stderr
 
 
 def test_mistakes_end_the_call_with_one_sentence_and_no_file(inputs, tmp_path):

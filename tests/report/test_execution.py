@@ -6,7 +6,7 @@ import pytest
 
 from pipeline.report import execution_numbers as numbers
 from pipeline.report import pairs
-from pipeline.report.execution_page import Film, pictures, rates
+from pipeline.report.execution_page import Film, pictures, rates, safety_table
 
 
 def executions(pairs_successes, features="label_mapping", n=10):
@@ -37,6 +37,34 @@ def test_a_pairs_row_counts_successes_refusals_and_causes():
     assert (row["n"], row["successes"], row["causes"]) == (10, 8, "aim 2")
     assert row["refused_share"] == pytest.approx(0.5)
     assert row["spilled_share"] == pytest.approx(2 * 21 / 1050)
+
+
+def test_a_refused_sample_counts_both_ways():
+    refused = executions({("a", "b"): 8})
+    followed = executions({("c", "b"): 10}).assign(n_refused=0)
+    found = numbers.numbers(pd.concat([refused, followed]), drawn_and_executed([]), ("c", "b"))
+    key = "execution.label_mapping"
+    assert (found[f"{key}.success"], found[f"{key}.first_sample"]) == (0.9, 0.5)
+    assert (found[f"{key}.novel.success"], found[f"{key}.novel.first_sample"]) == (0.8, 0.0)
+    assert found[f"{key}.refused_share"] == pytest.approx(1 / 3)
+    assert (found[f"{key}.first_sample_low"], found[f"{key}.first_sample_high"]) == (0.0, 1.0)
+
+
+def drawn_and_executed(executed):
+    names = ["held_object", "target_object", "features"]
+    drawn = pd.DataFrame([("a", "b", name, 100, 0.02, 1.0) for name in ("standard", "conditioned")])
+    drawn.columns = [*names, "samples", "way_in", "ever"]
+    return numbers.with_drawn(pd.DataFrame(executed, columns=[*names, "way_in", "ever"]), drawn)
+
+
+def test_safety_is_told_of_drawn_trajectories_and_of_executions_where_there_are_any():
+    safety = drawn_and_executed([("a", "b", "standard", 0.1, 0.9)])
+    found = numbers.numbers(executions({("a", "b"): 8}), safety, ("a", "b"))
+    key = "execution.standard.a.b.tilted_outside"
+    assert (found[f"{key}.way_in"], found[f"{key}.drawn_way_in"]) == (0.1, 0.02)
+    assert "execution.conditioned.a.b.tilted_outside.way_in" not in found
+    table = safety_table(safety).axes[0].tables[0]
+    assert [table[1, column].get_text().get_text() for column in (0, 1)] == ["2.0 / 10", "2.0 / –"]
 
 
 def trajectory(x_m, tilt_rad, draw=0):

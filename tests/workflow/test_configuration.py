@@ -87,3 +87,19 @@ def test_a_card_is_for_the_liquid_alone():
 def test_nearest_proposes_only_what_is_near():
     assert nearest("voxl_m", ["voxel_m", "points"]) == " (did you mean 'voxel_m'?)"
     assert nearest("abc", ["voxel_m", "points"]) == ""
+
+
+@pytest.mark.parametrize(
+    ("pairs", "said"),
+    [
+        (["mug/wide_bowl"], "two pairs at least or none, found mug/wide_bowl alone"),
+        (["mug/wide_bowl", "tall_cup/wide_bowl"], "found tall_cup/wide_bowl in both"),
+    ],
+)
+def test_what_is_shown_is_several_pairs_and_not_what_is_tested(pairs, said):
+    config = _config()
+    config["primitives"]["pairs"] = pairs
+    with pytest.raises(PipelineError, match=rf"^primitives\.pairs: .*{said}"):
+        check(config, SCHEMA)
+    config["primitives"]["pairs"] = []
+    check(config, SCHEMA)

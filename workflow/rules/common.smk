@@ -77,7 +77,9 @@ def named(option, pattern, wanted=True):
 
 def robot_figures():
     """Return the figures of the robot's half if there are demonstrations and both containers of their pair take part."""
-    return [f"{REPORTS}/{name}.pdf" for name in ("promp", "execution")] if HAS_DEMONSTRATIONS else []
+    return (
+        [f"{REPORTS}/{name}.pdf" for name in ("promp", "execution", "watching")] if HAS_DEMONSTRATIONS else []
+    )
 
 
 wildcard_constraints:

@@ -1,6 +1,7 @@
 # Needs the motor primitives, warped parameters, the prepared containers.
+# Makes execute/<held>/<target>/demonstrations/, what the scripted teacher shows for the conditioned primitive.
 # Makes execute/<held>/<target>/: attempts.parquet and trajectories.parquet (what the arm could and did), outcomes.parquet (what was
-#       poured on the way); of all pairs executions.parquet and trajectories.parquet. When asked for, films of executions, and
+#       poured on the way); of all pairs executions.parquet, trajectories.parquet, safety.parquet. When asked for, films of executions, and
 #       demonstrations/, the ten pours that data/demonstrations/tall_cup_wide_bowl is a copy of.
 # How: inverse kinematics and motors in Bullet; simulate carries gel balls along the poses that the arm has done.
 
@@ -8,6 +9,7 @@
 PAIRS = [pair.split("/") for pair in config["execute"]["pairs"]]
 # What the scripted teacher pours.
 DEMONSTRATED = ["tall_cup", "wide_bowl"]
+NAMED_PRIMITIVES = " ".join(f"{name}={path}" for name, path in PRIMITIVES.items())
 
 
 wildcard_constraints:
@@ -30,7 +32,7 @@ rule execute:
         held=container_of("held"),
         target=container_of("target"),
         parameters=expand(rules.assemble_parameters.output, source=SOURCE),
-        primitives=expand(f"{PROCESSED}/primitives/{SOURCE}/{{features}}/promp.json", features=FEATURE_SETS),
+        primitives=list(PRIMITIVES.values()),
         pair=os.path.join(DEMONSTRATIONS, "pair.yaml"),
     output:
         attempts=f"{PROCESSED}/execute/{{held}}/{{target}}/attempts.parquet",
@@ -41,9 +43,7 @@ rule execute:
         "benchmarks/execute/{held}/{target}/arm.tsv"
     threads: 1
     params:
-        primitives=" ".join(
-            f"{name}={PROCESSED}/primitives/{SOURCE}/{name}/promp.json" for name in FEATURE_SETS
-        ),
+        primitives=NAMED_PRIMITIVES,
         options=options("execute", "draws", "attempts", "seed"),
         code=code("pipeline.execute"),
     shell:
@@ -93,42 +93,74 @@ rule assemble_executions:
         " --trajectories {output.trajectories:q} {params.options} > {log:q} 2>&1"
 
 
+rule execute_safety:
+    input:
+        containers=each(rules.simulate_container.output.container),
+        parameters=expand(rules.assemble_parameters.output, source=SOURCE),
+        primitives=list(PRIMITIVES.values()),
+        pair=os.path.join(DEMONSTRATIONS, "pair.yaml"),
+    output:
+        safety=f"{PROCESSED}/execute/safety.parquet",
+    log:
+        "logs/execute/safety.log",
+    threads: 1
+    params:
+        pairs=" ".join(config["execute"]["pairs"]),
+        containers=named("containers", rules.simulate_container.output.container),
+        primitives=NAMED_PRIMITIVES,
+        samples=options("primitives", "samples"),
+        seed=options("execute", "seed"),
+        code=code("pipeline.execute.safety"),
+    shell:
+        "python -m pipeline.execute.safety --pairs {params.pairs} {params.containers} --parameters {input.parameters:q}"
+        " --primitives {params.primitives} --demonstration {input.pair:q} --safety {output.safety:q} {params.samples} {params.seed}"
+        " > {log:q} 2>&1"
+
+
 rule execute_film_balls:
     input:
         held=container_of("held"),
         target=container_of("target"),
         trajectories=rules.execute.output.trajectories,
     output:
-        film=f"{PROCESSED}/execute/{{held}}/{{target}}/balls.npz",
+        film=f"{PROCESSED}/execute/{{held}}/{{target}}/{{features}}/balls.npz",
     log:
-        "logs/execute/{held}/{target}/film_balls.log",
+        "logs/execute/{held}/{target}/{features}/film_balls.log",
+    benchmark:
+        "benchmarks/execute/{held}/{target}/{features}/film_balls.tsv"
+    wildcard_constraints:
+        features="|".join(PRIMITIVES),
     threads: 1
     params:
         options=options("execute", "fill", "balls", "seed"),
         code=code("pipeline.simulate.filmed"),
     shell:
         "python -m pipeline.simulate.filmed --held {wildcards.held}={input.held:q} --target {wildcards.target}={input.target:q}"
-        " --trajectories {input.trajectories:q} --film {output.film:q} {params.options} > {log:q} 2>&1"
+        " --trajectories {input.trajectories:q} --features {wildcards.features} --film {output.film:q} {params.options} > {log:q} 2>&1"
 
 
 rule execute_film:
     input:
         held=container_of("held"),
         target=container_of("target"),
-        parameters=expand(rules.assemble_parameters.output, source=SOURCE),
         trajectories=rules.execute.output.trajectories,
         balls=rules.execute_film_balls.output.film,
     output:
-        film=f"{PROCESSED}/execute/{{held}}/{{target}}/film.npz",
+        film=f"{PROCESSED}/execute/{{held}}/{{target}}/{{features}}/film.npz",
+        gif=f"{PROCESSED}/execute/{{held}}/{{target}}/{{features}}/film.gif",
     log:
-        "logs/execute/{held}/{target}/film.log",
+        "logs/execute/{held}/{target}/{features}/film.log",
+    benchmark:
+        "benchmarks/execute/{held}/{target}/{features}/film.tsv"
+    wildcard_constraints:
+        features="|".join(PRIMITIVES),
     threads: 1
     params:
         code=code("pipeline.execute.film"),
     shell:
         "python -m pipeline.execute.film --held {wildcards.held}={input.held:q} --target {wildcards.target}={input.target:q}"
-        " --parameters {input.parameters:q} --trajectories {input.trajectories:q} --balls-film {input.balls:q}"
-        " --film {output.film:q} 2>&1 | tee {log:q} >&2"
+        " --trajectories {input.trajectories:q} --balls-film {input.balls:q}"
+        " --features {wildcards.features} --film {output.film:q} --gif {output.gif:q} 2>&1 | tee {log:q} >&2"
 
 
 rule demonstrate:
@@ -146,6 +178,36 @@ rule demonstrate:
     shell:
         "python -m pipeline.execute.teacher --held {DEMONSTRATED[0]}={input.held:q} --target {DEMONSTRATED[1]}={input.target:q}"
         " --output $(dirname {output.pair:q}) > {log:q} 2>&1"
+
+
+rule demonstrate_pair:
+    input:
+        held=container_of("held"),
+        target=container_of("target"),
+    output:
+        pours=[
+            f"{PROCESSED}/execute/{{held}}/{{target}}/demonstrations/pour_{number:02d}.csv"
+            for number in range(config["primitives"]["pours_a_pair"])
+        ],
+        pair=f"{PROCESSED}/execute/{{held}}/{{target}}/demonstrations/pair.yaml",
+    log:
+        "logs/execute/{held}/{target}/demonstrations.log",
+    threads: 1
+    params:
+        pours=config["primitives"]["pours_a_pair"],
+        code=code("pipeline.execute.teacher"),
+    shell:
+        "python -m pipeline.execute.teacher --held {wildcards.held}={input.held:q} --target {wildcards.target}={input.target:q}"
+        " --sees-the-pair --pours {params.pours} --output $(dirname {output.pair:q}) > {log:q} 2>&1"
+
+
+rule films:
+    input:
+        [
+            rules.execute_film.output.gif.format(held=held, target=target, features=features)
+            for held, target in PAIRS
+            for features in PRIMITIVES
+        ],
 
 
 # Every object into every other, when reports/pairs.pdf is asked for.

@@ -8,6 +8,7 @@
 #       when asked for, reports/ablations.pdf and .json, the scores with one key changed at a time;
 #       reports/promp.pdf (Fig. 4) with reports/promp.json, where there are demonstrations of a pour;
 #       reports/execution.pdf (Fig. 5), execution.gif and execution.json, what the robot poured, where there are demonstrations;
+#       reports/watching.pdf and .json, what the classifiers say along these executions;
 #       when asked for, reports/pairs.pdf and .json, every object into every other, with the liquid;
 #       when asked for, reports/physics.pdf and reports/physics.json, the liquid against hydrostatics and against Bullet's spheres.
 # How: one module a figure; truth is compared here and nowhere else.
@@ -193,6 +194,8 @@ rule report_primitives:
     input:
         primitives=expand(rules.primitives.output.primitive, source=SOURCE, features=FEATURE_SETS),
         trajectories=expand(rules.primitives.output.trajectories, source=SOURCE, features=FEATURE_SETS),
+        conditioned=[PRIMITIVES["conditioned"]] if SHOWN_PAIRS else [],
+        parameters=expand(rules.assemble_parameters.output, source=SOURCE),
     output:
         pages=f"{REPORTS}/promp.pdf",
         numbers=f"{REPORTS}/promp.json",
@@ -201,10 +204,17 @@ rule report_primitives:
     threads: 1
     params:
         options=options("primitives", "prior_demonstrations"),
+        # The first pairs that are executed.
+        conditioned=(
+            f"--conditioned {PRIMITIVES['conditioned']} --pairs {' '.join(config['execute']['pairs'][:4])}"
+            if SHOWN_PAIRS
+            else ""
+        ),
         code=code("pipeline.report.primitives"),
     shell:
         "python -m pipeline.report.primitives --primitives {input.primitives:q} --trajectories {input.trajectories:q}"
-        " --pages {output.pages:q} --numbers {output.numbers:q} {params.options} > {log:q} 2>&1"
+        " --pages {output.pages:q} --numbers {output.numbers:q} {params.options} --parameters {input.parameters:q} {params.conditioned}"
+        " > {log:q} 2>&1"
 
 
 rule report_physics:
@@ -260,8 +270,13 @@ rule report_execution:
     input:
         executions=rules.assemble_executions.output.executions,
         trajectories=rules.assemble_executions.output.trajectories,
+        safety=rules.execute_safety.output.safety,
+        pair=os.path.join(DEMONSTRATIONS, "pair.yaml"),
         parameters=expand(rules.assemble_parameters.output, source=SOURCE),
-        films=[rules.execute_film.output.film.format(held=held, target=target) for held, target in FILMED],
+        films=[
+            rules.execute_film.output.film.format(held=held, target=target, features="label_mapping")
+            for held, target in FILMED
+        ],
     output:
         pages=f"{REPORTS}/execution.pdf",
         film=f"{REPORTS}/execution.gif",
@@ -270,13 +285,37 @@ rule report_execution:
         "logs/report/execution.log",
     threads: 1
     params:
-        films=" ".join(f"{h}/{t}={PROCESSED}/execute/{h}/{t}/film.npz" for h, t in FILMED),
-        demonstrated="/".join(DEMONSTRATED),
+        films=" ".join(f"{h}/{t}={PROCESSED}/execute/{h}/{t}/label_mapping/film.npz" for h, t in FILMED),
         code=code("pipeline.report.execution"),
     shell:
         "python -m pipeline.report.execution --executions {input.executions:q} --trajectories {input.trajectories:q}"
-        " --parameters {input.parameters:q} --demonstrated {params.demonstrated} --films {params.films}"
+        " --parameters {input.parameters:q} --safety {input.safety:q} --demonstration {input.pair:q} --films {params.films}"
         " --pages {output.pages:q} --film {output.film:q} --numbers {output.numbers:q} > {log:q} 2>&1"
+
+
+rule report_watching:
+    input:
+        pouring=f"{PROCESSED}/classify/pouring/models.json",
+        filling=f"{PROCESSED}/classify/filling/models.json",
+        parameters=expand(rules.assemble_parameters.output, source=SOURCE),
+        trajectories=rules.assemble_executions.output.trajectories,
+        balls=of_pairs(rules.execute_balls.output.outcomes),
+        liquid=of_pairs(rules.execute_liquid.output.outcomes),
+    output:
+        pages=f"{REPORTS}/watching.pdf",
+        numbers=f"{REPORTS}/watching.json",
+    log:
+        "logs/report/watching.log",
+    threads: 1
+    params:
+        fill=options("execute", "fill"),
+        filling=options("simulate.filling", "held_particles", "tilt_deg"),
+        spacing=options("simulate", "spacing_m"),
+        code=code("pipeline.report.watching"),
+    shell:
+        "python -m pipeline.report.watching --source {SOURCE} --pouring {input.pouring:q} --filling {input.filling:q}"
+        " --parameters {input.parameters:q} --trajectories {input.trajectories:q} --balls {input.balls:q} --liquid {input.liquid:q}"
+        " --pages {output.pages:q} --numbers {output.numbers:q} {params.fill} {params.filling} {params.spacing} > {log:q} 2>&1"
 
 
 rule report_pairs:

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pipeline import artefacts, command
-from pipeline.errors import PipelineError
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from pipeline.execute.primitives import Primitive
     from pipeline.execute.task import Task
 
 Row = dict[str, Any]
@@ -28,17 +28,20 @@ def main() -> None:
     options = _options()
     import pandas as pd
 
-    from pipeline.execute import pairs
+    from pipeline.execute import primitives
+    from pipeline.motion.demonstrations import read_pair
 
-    parameters = artefacts.read_table(options.parameters, "parameters")
-    names, demonstrated = (options.held[0], options.target[0]), _demonstrated(options.demonstration)
+    parameters, shown = (
+        artefacts.read_table(options.parameters, "parameters"),
+        read_pair(options.demonstration),
+    )
+    names, demonstrated = (options.held[0], options.target[0]), (shown["held_object"], shown["target_object"])
     attempts: list[dict[str, Any]] = []
     trajectories: list[pd.DataFrame] = []
     for features, path in options.primitives:
-        task = pairs.task(parameters, features, *names, demonstrated)
-        sample = _sampler(path, parameters, features, options)
+        primitive = primitives.read(path, parameters, features, names, demonstrated)
         head = {"held_object": names[0], "target_object": names[1], "features": features}
-        for attempt, done in _executed(options, task, sample, f"{names[0]} into {names[1]}, {features}"):
+        for attempt, done in _executed(options, primitive, f"{names[0]} into {names[1]}, {features}"):
             attempts.append({**head, **attempt})
             if done is not None:
                 trajectories.append(done.assign(**head))
@@ -69,28 +72,15 @@ def _options() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def _demonstrated(path: Path) -> tuple[str, str]:
-    """Return the names of the demonstrated pair."""
-    import yaml
-
-    try:
-        pair = yaml.safe_load(path.read_text())
-        return str(pair["held_object"]), str(pair["target_object"])
-    except (OSError, yaml.YAMLError, KeyError, TypeError) as error:
-        raise PipelineError(
-            f"{path}: expected the keys held_object and target_object, found {type(error).__name__}: {error}; name the "
-            "demonstrated pair there"
-        ) from error
-
-
 def _executed(
-    options: argparse.Namespace, task: "Task", sample: Sample, what: str
+    options: argparse.Namespace, primitive: "Primitive", what: str
 ) -> "Iterator[tuple[Row, pd.DataFrame | None]]":
     """Yield what there is to say about each sample (draw, attempt), and what the arm did if it could follow it."""
     from pipeline.execute import containers, following
     from pipeline.execute.cell import Cell, T_cup_flange
     from pipeline.execute.task import Task
 
+    task, sample = primitive.task, _sampler(primitive, options.seed)
     cup, second = (containers.solid(*each) for each in (options.held, options.target))
     # What really is where: the containers' own rims.
     lip_m = containers.lip_m(options.held[1], task.yaw_rad)
@@ -110,20 +100,15 @@ def _executed(
                     break
 
 
-def _sampler(path: Path, parameters: "pd.DataFrame", features: str, options: argparse.Namespace) -> Sample:
+def _sampler(primitive: "Primitive", seed: int) -> Sample:
     """Return what draws a trajectory (T, 4), metres and radians, every PLAN_S: the same random numbers for every feature set."""
     from pipeline.execute.following import PLAN_S
-    from pipeline.motion import scaling
-    from pipeline.motion.promp import ProMP
 
-    promp = ProMP.from_json(artefacts.read_json(path))
-    pair = options.held[0], options.target[0]
-    factors = scaling.factors(parameters, features, *pair)
-    phase = np.linspace(0.0, 1.0, round(promp.duration_s / PLAN_S) + 1)
-    own = zlib.crc32("/".join(pair).encode())
+    phase = np.linspace(0.0, 1.0, round(primitive.promp.duration_s / PLAN_S) + 1)
+    own = zlib.crc32("/".join(primitive.pair).encode())
 
     def sample(draw: int, attempt: int) -> np.ndarray:
-        return factors * promp.sample(phase, np.random.default_rng([options.seed, own, draw, attempt]))
+        return primitive.samples(phase, 1, np.random.default_rng([seed, own, draw, attempt]))[0]
 
     return sample
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from pipeline.artefacts import read_arrays
 from pipeline.execute.cell import Solid
+from pipeline.geometry.cavity import TIE_M
 
 
 def solid(name: str, path: Path) -> Solid:
@@ -29,3 +30,12 @@ def lip_m(path: Path, yaw_rad: float) -> np.ndarray:
     offset = arrays["cavity_rim_m"] - arrays["cavity_opening_m"]
     turn = np.angle(np.exp(1j * (np.arctan2(offset[:, 1], offset[:, 0]) - yaw_rad)))
     return arrays["cavity_rim_m"][np.argmin(np.abs(turn))]
+
+
+def spout_yaw_rad(path: Path) -> float:
+    """Return where a container pours to, its own frame: its rim's lowest point, of level ones that furthest along +x."""
+    arrays = read_arrays(path)
+    rim_m, opening = arrays["cavity_rim_m"], arrays["cavity_opening_m"]
+    low = rim_m[rim_m[:, 2] <= rim_m[:, 2].min() + TIE_M]
+    out = low[np.argmax(low[:, 0])] - opening
+    return float(np.arctan2(out[1], out[0]))

@@ -1,6 +1,8 @@
 """Film an execution with Bullet's own renderer: the arm along what it did, the containers, the balls."""
 
+import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pybullet
@@ -9,9 +11,12 @@ from pipeline import artefacts, command
 from pipeline.execute import containers, kinematics
 from pipeline.execute.cell import Cell, Solid, T_cup_flange
 from pipeline.execute.following import PLAN_S
-from pipeline.execute.pairs import task
+from pipeline.execute.task import TILT_AXIS
 from pipeline.geometry import bodies
 from pipeline.geometry.frames import inverse, transform
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SIZE = (480, 360)
 _EYE_M, _AT_M, _FIELD_DEG = [0.60, 0.50, 0.42], [-0.09, -0.02, 0.11], 29.0
@@ -78,21 +83,28 @@ def main() -> None:
     parser = command.parser(__doc__)
     for role in ("--held", "--target"):
         parser.add_argument(role, type=command.name_and_path, required=True, metavar="NAME=FILE")
-    parser.add_argument("--parameters", type=Path, required=True, help="warped parameters of all objects")
     parser.add_argument("--trajectories", type=Path, required=True, help="what the arm did")
     parser.add_argument("--features", default="label_mapping", help="whose motor primitive")
     parser.add_argument("--balls-film", type=Path, required=True, help="where the balls are in each frame")
     parser.add_argument("--film", type=Path, required=True, help="where the frames are written (NPZ)")
+    parser.add_argument("--gif", type=Path, required=True, help="where they are written to be looked at")
     options = parser.parse_args()
 
     table = artefacts.read_table(options.trajectories, "trajectories")
     film = artefacts.read_arrays(options.balls_film)
     run = table[(table["features"] == options.features) & (table["draw"] == int(film["draw"]))]
+    images = _pictures(options, run, film) if len(run) else [_nothing()]
+    same = {name: film[name] for name in ("every_s", "draw")}
+    artefacts.write_arrays(options.film, {"images": np.array(images), **same})
+    artefacts.write_film(options.gif, images, float(film["every_s"]))
+
+
+def _pictures(options: argparse.Namespace, run: "pd.DataFrame", film: artefacts.Arrays) -> list[np.ndarray]:
     balls = np.split(film["balls_m"], np.cumsum(film["counts"])[:-1])
     T_world_held, T_world_second = artefacts.poses(run), artefacts.T_world_second(run)
-    parameters = artefacts.read_table(options.parameters, "parameters")
-    names = options.held[0], options.target[0]
-    yaw_rad = task(parameters, options.features, *names, names).yaw_rad
+    # The arm turns the cup about one axis that is fixed in it: along the world's y.
+    axis = T_world_held[0, :3, :3].T @ TILT_AXIS
+    yaw_rad = float(np.arctan2(-axis[0], axis[1]))
     cup, second = (containers.solid(*each) for each in (options.held, options.target))
     images = []
     with Cell(cup, second, T_world_second, T_cup_flange(cup, yaw_rad)) as cell:
@@ -103,8 +115,18 @@ def main() -> None:
         ):
             cell.pose_arm(q[min(round(number * float(film["every_s"]) / PLAN_S), len(q) - 1)])
             images.append(studio.image(T_world_second, there))
-    same = {name: film[name] for name in ("every_s", "draw")}
-    artefacts.write_arrays(options.film, {"images": np.array(images), **same})
+    return images
+
+
+def _nothing() -> np.ndarray:
+    """Return a picture that says why there is none."""
+    from PIL import Image, ImageDraw
+
+    blank = Image.new("RGB", SIZE, "white")
+    ImageDraw.Draw(blank).text(
+        (SIZE[0] // 2, SIZE[1] // 2), "the arm could follow no sample", "black", anchor="mm"
+    )
+    return np.asarray(blank)
 
 
 if __name__ == "__main__":

@@ -36,6 +36,17 @@ class Task:
             poses.append(transform(R, opening + offset - R @ self.lip_m))
         return np.array(poses)
 
+    def own(self, trajectories: np.ndarray, lip_m: np.ndarray, opening_m: np.ndarray) -> np.ndarray:
+        """Return trajectories (..., 4) of this task as those of another lip and opening (3,) of the same containers."""
+        upright = rotation_about(np.array([0.0, 0.0, 1.0]), -self.yaw_rad)
+        off_x, off_y, off_z = upright @ (lip_m - self.lip_m)
+        sin, cos = np.sin(trajectories[..., 3]), np.cos(trajectories[..., 3])
+        tilted = np.stack(
+            [cos * off_x + sin * off_z, np.full_like(sin, off_y), cos * off_z - sin * off_x], axis=-1
+        )
+        place = trajectories[..., :3] + tilted - (opening_m - self.opening_m)
+        return np.concatenate([place, trajectories[..., 3:]], axis=-1)
+
     def trajectory(self, T_world_cup: np.ndarray, T_world_second: np.ndarray | None = None) -> np.ndarray:
         """Return the task-space trajectory (T, 4) of cup poses (T, 4, 4): the way back.
 

@@ -1,5 +1,6 @@
 """What is usually wrong with a recorded pour, each named in one sentence."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +10,14 @@ from pipeline.errors import PipelineError
 LEAST_ROWS = 20
 # A gap is much longer than the other steps, and long enough for a hand to have moved.
 GAP_STEPS, GAP_S = 5.0, 0.2
-LONGEST_S = 300.0  # of a pour
+SHORTEST_S, LONGEST_S = 0.3, 300.0  # of a pour
 REACH_M = 3.0  # of an arm
 FASTEST_M_S = 5.0  # of a hand
 TURN_RAD = 2.0 * np.pi
 LEAST_TILT_RAD = 0.2  # 11 degrees: less is carrying
+FROM_BEYOND_M = 0.05
+# A cup is taken back when it ends at less than this share of its largest tilt.
+TAKEN_BACK = 0.75
 
 
 def check(path: Path, table: np.ndarray) -> None:
@@ -44,6 +48,23 @@ def tilts(path: str | Path, tilt_rad: np.ndarray) -> None:
         )
 
 
+def together(files: Sequence[str], trajectories: Sequence[np.ndarray]) -> None:
+    """Check the pours (T_i, 4) of a folder, lip x, y, z in metres and tilt in radians, against the frame and each other."""
+    for name, one in zip(files, trajectories, strict=True):
+        start_m, there_m = one[0, 0], one[one[:, 3].argmax(), 0]
+        if start_m > FROM_BEYOND_M and there_m < start_m - FROM_BEYOND_M:
+            raise PipelineError(
+                f"{name}: expected a lip that comes along x towards the opening, found that it begins {start_m:.3g} m "
+                f"beyond its centre and comes back to {there_m:.3g} m; is x the other way round? turn x and y about"
+            )
+    back = [one[-1, 3] < one[0, 3] + TAKEN_BACK * (one[:, 3].max() - one[0, 3]) for one in trajectories]
+    if any(back) and not all(back):
+        raise PipelineError(
+            f"{files[back.index(False)]}: expected a cup that is taken back at the end, as in {files[back.index(True)]}, found a "
+            "recording that ends while it is tilted; record the pour again or remove the file"
+        )
+
+
 def _rows(path: Path, table: np.ndarray) -> None:
     if len(table) < LEAST_ROWS:
         raise PipelineError(
@@ -61,6 +82,11 @@ def _time(path: Path, t_s: np.ndarray) -> None:
     if t_s[-1] - t_s[0] > LONGEST_S:
         raise PipelineError(
             f"{path}: expected a pour of less than {LONGEST_S:g} s, found {t_s[-1] - t_s[0]:.4g}; is t_s in milliseconds? give "
+            "seconds"
+        )
+    if t_s[-1] - t_s[0] < SHORTEST_S:
+        raise PipelineError(
+            f"{path}: expected a pour of at least {SHORTEST_S:g} s, found {t_s[-1] - t_s[0]:.3g}; is t_s in minutes? give "
             "seconds"
         )
     longest = int(np.argmax(step_s))

@@ -13,9 +13,10 @@ import numpy as np
 import pandas as pd
 
 from pipeline.errors import PipelineError
-from pipeline.motion import basis, fitting
+from pipeline.motion import basis, fitting, saved
 from pipeline.motion.promp import ProMP
 
+CONDITIONED = "conditioned"
 HELD = ("radius_m", "height_m", "tilt_reference_rad", "volume_m3")
 TARGET = ("radius_m", "height_m")
 # Standard deviation with which a logarithm of a warped parameter is known; a warp is within a few per cent.
@@ -89,3 +90,29 @@ class ConditionedProMP:
             weights_mean=self.residual.weights_mean + self.slope @ off,
             weights_covariance=self.residual.weights_covariance * further,
         )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what `from_json` reads: the primitive of what is left, and the regression of the weights."""
+        arrays = {"slope": self.slope, "centre": self.centre, "spread": self.spread}
+        return {
+            "residual": self.residual.to_json(),
+            **{key: value.tolist() for key, value in arrays.items()},
+        }
+
+    @classmethod
+    def from_json(cls, content: Any, where: str = "promp.json") -> "ConditionedProMP":
+        """Return the primitive that `to_json` gave; `where` names the file in errors."""
+        keys = ("residual", "slope", "centre", "spread")
+        if not isinstance(content, dict) or not set(keys) <= set(content):
+            raise PipelineError(
+                f"{where}: expected a conditioned primitive with {' '.join(keys)}, found something else; make it again"
+            )
+        residual, n = ProMP.from_json(content["residual"], where), np.size(content["centre"])
+        shapes = {"slope": (len(residual.weights_mean), n), "centre": (n,), "spread": (n, n)}
+        arrays = {key: saved.array(content[key], where, key) for key in shapes}
+        for key, shape in shapes.items():
+            if arrays[key].shape != shape or not np.isfinite(arrays[key]).all():
+                raise PipelineError(
+                    f"{where}: expected {key} of shape {shape} without gaps, found {arrays[key].shape}; make it again"
+                )
+        return cls(residual, **arrays)

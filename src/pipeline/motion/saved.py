@@ -52,7 +52,7 @@ def fields(content: Any, where: str) -> dict[str, Any]:
         )
     count = len(content["dimensions"])
     n = count * content["n_basis"]
-    arrays = {key: _array(content[key], where, key) for key in _shapes(count, n)}
+    arrays = {key: array(content[key], where, key) for key in _shapes(count, n)}
     for key, shape in _shapes(count, n).items():
         if arrays[key].shape != shape or not np.isfinite(arrays[key]).all():
             raise PipelineError(
@@ -71,7 +71,8 @@ def _shapes(count: int, n: int) -> dict[str, tuple[int, ...]]:
     return {"weights_mean": (n,), "weights_covariance": (n, n), "noise_variance": (count,)}
 
 
-def _array(value: Any, where: str, key: str) -> np.ndarray:
+def array(value: Any, where: str, key: str) -> np.ndarray:
+    """Return rows of numbers as an array; `where` and `key` name them in errors."""
     try:
         return np.array(value, dtype=float)
     except ValueError as error:

@@ -29,6 +29,7 @@ def task_space(
     parameters, rims: the tables `parameters` and `tilt_references`; they are needed where the files hold cup poses.
     """
     if not shown.poses or shown.target_pose is None:
+        checks.together(shown.files, shown.values)
         return list(shown.values)
     names = {"held_object": shown.held_object, "target_object": shown.target_object}
     rim = rims[(rims["object"] == shown.held_object) & (rims["mapping"] == mapping)]
@@ -46,6 +47,7 @@ def task_space(
         one = poses.trajectory(poses.matrices(recorded), rim_m, T_world_second, opening_m, name)
         checks.tilts(name, one[:, 3])
         found.append(one)
+    checks.together(shown.files, found)
     return found
 
 
@@ -61,11 +63,8 @@ def learn(
     """Return the primitive of a feature set: scaled by the pair's references, rests cut off, phases aligned."""
     mapping = "label_mapping" if features == "standard" else features
     references = scaling.factors(parameters, features, shown.held_object, shown.target_object)
-    times_s, trajectories = [], []
-    for t_s, one in zip(shown.times_s, task_space(shown, parameters, rims, mapping), strict=True):
-        moving = phase.moving(t_s, one)
-        times_s.append(t_s[moving])
-        trajectories.append(scaling.to_dimensionless(one[moving], references))
+    times_s, moving = without_rests(shown, task_space(shown, parameters, rims, mapping))
+    trajectories = [scaling.to_dimensionless(one, references) for one in moving]
     phases = phase.aligned(times_s, [one[:, 3] for one in trajectories])
     promp = ProMP.fit(
         trajectories,
@@ -76,3 +75,12 @@ def learn(
         duration_s=float(np.mean([t[-1] - t[0] for t in times_s])),
     )
     return Learnt(promp, trajectories, phases, references)
+
+
+def without_rests(
+    shown: Demonstrations, trajectories: list[np.ndarray]
+) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Return times (T_i,) and trajectories (T_i, 4) of demonstrations, from where they begin to move to where they end."""
+    parts = [phase.moving(t_s, one) for t_s, one in zip(shown.times_s, trajectories, strict=True)]
+    times_s = [t_s[part] for t_s, part in zip(shown.times_s, parts, strict=True)]
+    return times_s, [one[part] for one, part in zip(trajectories, parts, strict=True)]

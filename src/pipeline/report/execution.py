@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipeline import command
-from pipeline.artefacts import read_arrays, read_table, replacing, write_json
+from pipeline.artefacts import read_arrays, read_table, write_film, write_json
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,7 +22,10 @@ def main() -> None:
     parser.add_argument("--executions", type=Path, required=True)
     parser.add_argument("--trajectories", type=Path, required=True)
     parser.add_argument("--parameters", type=Path, required=True, help="warped parameters of all objects")
-    parser.add_argument("--demonstrated", required=True, help="the demonstrated pair, as held/target")
+    parser.add_argument(
+        "--safety", type=Path, required=True, help="of drawn trajectories, by the stage execute"
+    )
+    parser.add_argument("--demonstration", type=Path, required=True, help="pair.yaml of the demonstrations")
     parser.add_argument(
         "--films", nargs="+", required=True, type=command.name_and_path, metavar="HELD/TARGET=FILE"
     )
@@ -30,36 +33,43 @@ def main() -> None:
         parser.add_argument(name, type=Path, required=True)
     options = parser.parse_args()
 
+    from pipeline.motion.demonstrations import read_pair
     from pipeline.report import execution_numbers, execution_page
     from pipeline.report.style import save
 
+    shown = read_pair(options.demonstration)
+    demonstrated = shown["held_object"], shown["target_object"]
     executions = read_table(options.executions, "executions")
     trajectories = read_table(options.trajectories, "trajectories")
-    safety = execution_numbers.unsafe(trajectories, read_table(options.parameters, "parameters"))
-    films = [film(pair, path, executions, options.demonstrated) for pair, path in options.films]
-    save([execution_page.pictures(films), execution_page.rates(executions, safety)], options.pages)
+    executed = execution_numbers.unsafe(trajectories, read_table(options.parameters, "parameters"))
+    safety = execution_numbers.with_drawn(executed, read_table(options.safety, "safety"))
+    films = [film(pair, path, executions, demonstrated) for pair, path in options.films]
+    pages = [execution_page.pictures(films), execution_page.rates(executions, safety)]
+    save([*pages, execution_page.safety_table(safety)], options.pages)
     write_gif(options.film, films)
-    demonstrated = tuple(options.demonstrated.split("/"))
     write_json(options.numbers, execution_numbers.numbers(executions, safety, demonstrated))
 
 
-def film(pair: str, path: Path, executions: "pd.DataFrame", demonstrated: str) -> "Film":
+def film(pair: str, path: Path, executions: "pd.DataFrame", demonstrated: tuple[str, str]) -> "Film":
     """Return the film of a pair, with the counts of the execution that it shows."""
     from pipeline.report.execution_page import Film
 
     arrays = read_arrays(path)
     held, target = pair.split("/")
-    row = executions[
+    rows = executions[
         (executions["held_object"] == held)
         & (executions["target_object"] == target)
         & (executions["features"] == "label_mapping")
         & (executions["draw"] == int(arrays["draw"]))
-    ].iloc[0]
+    ]
     title = f"{held.replace('_', ' ')} into\n{target.replace('_', ' ')}"
-    if pair == demonstrated:
+    if (held, target) == demonstrated:
         title += "\n(demonstrated)"
-    caption = f"{row.n_in_target} of {row.n_balls} balls in the target, {row.n_spilled} beside it"
-    return Film(title, caption, arrays["images"], float(arrays["every_s"]), float(row.first_drop_s))
+    caption, drop_s = "the arm could follow no sample", np.nan
+    for row in rows.itertuples():
+        caption = f"{row.n_in_target} of {row.n_balls} balls in the target, {row.n_spilled} beside it"
+        drop_s = float(row.first_drop_s)
+    return Film(title, caption, arrays["images"], float(arrays["every_s"]), drop_s)
 
 
 def write_gif(path: Path, films: "list[Film]") -> None:
@@ -72,19 +82,9 @@ def write_gif(path: Path, films: "list[Film]") -> None:
         for number in range(length)
     ]
     width = _WIDTH_PX * min(len(films), 2)
-    height = round(frames[0].height * width / frames[0].width)
-    # One palette for all frames: no flicker, and a smaller file.
-    small = [frame.resize((width, height), Image.Resampling.LANCZOS) for frame in frames]
-    palette = small[length // 2].quantize(128)
-    indexed = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in small]
-    with replacing(path) as temporary:
-        indexed[0].save(
-            temporary,
-            save_all=True,
-            append_images=indexed[1:],
-            duration=round(1000.0 * films[0].every_s),
-            loop=0,
-        )
+    size = width, round(frames[0].height * width / frames[0].width)
+    small = [np.asarray(frame.resize(size, Image.Resampling.LANCZOS)) for frame in frames]
+    write_film(path, small, films[0].every_s)
 
 
 def _mosaic(images: list[np.ndarray]) -> np.ndarray:

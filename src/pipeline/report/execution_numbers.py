@@ -16,12 +16,17 @@ def wilson(successes: int, n: int) -> tuple[float, float]:
     return max(0.0, centre - half), min(1.0, centre + half)
 
 
-def clustered(rows: pd.DataFrame, seed: int = 0) -> tuple[float, float]:
-    """Return a 95 % interval of the rate of success by bootstrap over pairs: a pair's executions are not independent."""
-    by_pair = rows.groupby(PAIR)["success"].mean().to_numpy()
+def clustered(rows: pd.DataFrame, name: str = "success", seed: int = 0) -> tuple[float, float]:
+    """Return a 95 % interval of the rate of `name` by bootstrap over pairs: a pair's executions are not independent."""
+    by_pair = rows.groupby(PAIR)[name].mean().to_numpy()
     drawn = np.random.default_rng(seed).integers(0, len(by_pair), (RESAMPLES, len(by_pair)))
     low, high = np.quantile(by_pair[drawn].mean(axis=1), [0.025, 0.975])
     return float(low), float(high)
+
+
+def first_sample(executions: pd.DataFrame) -> pd.Series:
+    """Return of each execution whether it succeeded with its first sample: a refused one counts as a failure, not as a redraw."""
+    return executions["success"] & (executions["n_refused"] == 0)
 
 
 def by_pair(executions: pd.DataFrame) -> pd.DataFrame:
@@ -33,6 +38,7 @@ def by_pair(executions: pd.DataFrame) -> pd.DataFrame:
             {
                 **{"held_object": held, "target_object": target, "features": features},
                 **{"n": len(part), "successes": int(part["success"].sum())},
+                "first_successes": int(first_sample(part).sum()),
                 "refused_share": part["n_refused"].sum()
                 / (part["n_refused"] + (part["cause"] != "arm")).sum(),
                 "spilled_share": part["n_spilled"].sum() / max(part["n_balls"].sum(), 1),
@@ -64,6 +70,13 @@ def unsafe(trajectories: pd.DataFrame, parameters: pd.DataFrame) -> pd.DataFrame
     )
 
 
+def with_drawn(executed: pd.DataFrame, drawn: pd.DataFrame) -> pd.DataFrame:
+    """Return what `unsafe` told of executions beside what the stage execute drew (table `safety`): drawn_way_in, drawn_ever."""
+    names = {"way_in": "drawn_way_in", "ever": "drawn_ever"}
+    both = drawn.drop(columns="samples").rename(columns=names)
+    return both.merge(executed, how="left", on=[*PAIR, "features"])
+
+
 def numbers(
     executions: pd.DataFrame, safety: pd.DataFrame, demonstrated: tuple[str, str]
 ) -> dict[str, float]:
@@ -76,12 +89,7 @@ def numbers(
         key = f"execution.{features}"
         for name, part in (("", rows), (".novel", novel[novel["features"] == features])):
             if len(part):
-                low, high = clustered(part)
-                found |= {
-                    f"{key}{name}.success": float(part["success"].mean()),
-                    f"{key}{name}.success_low": low,
-                }
-                found |= {f"{key}{name}.success_high": high, f"{key}{name}.executions": len(part)}
+                found |= {f"{key}{name}.{what}": value for what, value in _rates(part).items()}
         attempts = (rows["n_refused"] + (rows["cause"] != "arm")).sum()
         found[f"{key}.refused_share"] = float(rows["n_refused"].sum() / attempts)
         for cause, count in rows.loc[~rows["success"], "cause"].value_counts().items():
@@ -91,5 +99,17 @@ def numbers(
         found |= {f"{key}.success": row.successes / row.n, f"{key}.spilled_share": float(row.spilled_share)}
     for row in safety.itertuples():
         key = f"execution.{row.features}.{row.held_object}.{row.target_object}.tilted_outside"
-        found |= {f"{key}.way_in": float(row.way_in), f"{key}.ever": float(row.ever)}
+        if row.way_in == row.way_in:  # nothing to tell of a pair that the arm never followed
+            found |= {f"{key}.way_in": float(row.way_in), f"{key}.ever": float(row.ever)}
+        found |= {f"{key}.drawn_way_in": float(row.drawn_way_in), f"{key}.drawn_ever": float(row.drawn_ever)}
+    return found
+
+
+def _rates(part: pd.DataFrame) -> dict[str, float]:
+    """Return the rate of success with its interval over pairs, refused samples redrawn, and as failures (first_sample)."""
+    rows = part.assign(first_sample=first_sample(part))
+    found: dict[str, float] = {"executions": len(rows)}
+    for name in ("success", "first_sample"):
+        low, high = clustered(rows, name)
+        found |= {name: float(rows[name].mean()), f"{name}_low": low, f"{name}_high": high}
     return found

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 MOMENTS = ("before", "during", "after")
 _INTO_FLOW_S = 0.25
-_MARKERS = {"label_mapping": "o", "point_mapping": "s", "standard": "^"}
+_MARKERS = {"label_mapping": "o", "point_mapping": "s", "standard": "^", "conditioned": "D"}
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,9 @@ class Film:
 
     def moments(self) -> list[np.ndarray]:
         """Return the pictures before, during and after the pour."""
-        during = min(int((self.first_drop_s + _INTO_FLOW_S) / self.every_s) + 1, len(self.images) - 1)
+        flows_s, last = self.first_drop_s + _INTO_FLOW_S, len(self.images) - 1
+        # Where nothing came out, the middle.
+        during = min(int(flows_s / self.every_s) + 1, last) if np.isfinite(flows_s) else last // 2
         return [self.images[0], self.images[during], self.images[-1]]
 
 
@@ -59,20 +61,21 @@ def rates(executions: "pd.DataFrame", safety: "pd.DataFrame") -> "Figure":
     import matplotlib.pyplot as plt
 
     table = by_pair(executions).merge(safety, how="left", on=[*PAIR, "features"])
-    pairs = list(dict.fromkeys(zip(table["held_object"], table["target_object"], strict=True)))
+    # In the configuration's order.
+    pairs = list(dict.fromkeys(zip(safety["held_object"], safety["target_object"], strict=True)))
     with plt.rc_context(RC):
         figure, axes = plt.subplots(
             1, 3, figsize=(7.2, 1.2 + 0.42 * len(pairs)), sharey=True, layout="constrained"
         )
-        for number, (features, colour) in enumerate(COLOURS.items()):
+        for number, (features, marker) in enumerate(_MARKERS.items()):
             rows = table[table["features"] == features]
             if rows.empty:
                 continue
             at = [
-                pairs.index(pair) + 0.22 * (number - 1)
+                pairs.index(pair) + 0.2 * (number - 1.5)
                 for pair in zip(*(rows[name] for name in PAIR), strict=True)
             ]
-            style = {"color": colour, "marker": _MARKERS[features], "ms": 3.5, "ls": "none"}
+            style = {"color": COLOURS[features], "marker": marker, "ms": 3.5, "ls": "none"}
             _successes(axes[0], rows, at, style, WORDS[features])
             axes[1].plot(100.0 * rows["spilled_share"], at, **style)
             axes[2].plot(100.0 * rows["way_in"], at, **style)
@@ -81,18 +84,54 @@ def rates(executions: "pd.DataFrame", safety: "pd.DataFrame") -> "Figure":
             range(len(pairs)), [f"{held} into {target}".replace("_", " ") for held, target in pairs]
         )
         axes[0].invert_yaxis()
-        axes[0].set_xlabel("executions that succeeded, %\n(bars: 95 %, Wilson)")
+        axes[0].set_xlabel(
+            "executions that succeeded, %\n(bars: 95 %, Wilson; open: a refused\nsample counts as a failure)"
+        )
         axes[1].set_xlabel("balls beside the target,\n% of those in the cup")
         axes[2].set_xlabel("tilted above the reference,\nlip outside, % of executions\n(open: way back, too)")
         for axis in axes:
             axis.set_xlim(-4, 104)
             axis.grid(axis="y", lw=0.3, color="0.85")
-        figure.legend(loc="outside upper center", ncols=3, frameon=False)
+        figure.legend(loc="outside upper center", ncols=4, frameon=False)
     return figure
+
+
+def safety_table(safety: "pd.DataFrame") -> "Figure":
+    """Return the page with P(tilt > 1 while the lip is outside the opening) a pair: of drawn trajectories, and of executions."""
+    import matplotlib.pyplot as plt
+
+    sets = [name for name in _MARKERS if name in set(safety["features"])]
+    pairs = list(dict.fromkeys(zip(safety["held_object"], safety["target_object"], strict=True)))
+    rows = safety.set_index([*PAIR, "features"])
+    with plt.rc_context(RC):
+        figure, axes = plt.subplots(2, 1, figsize=(7.2, 1.5 + 0.36 * len(pairs)), layout="constrained")
+    titles = (
+        "until the lip first comes above the opening",
+        "at any time, the way back with an empty cup too",
+    )
+    for axis, name, title in zip(axes, ("way_in", "ever"), titles, strict=True):
+        cells = [[_cell(rows.loc[(*pair, features)], name) for features in sets] for pair in pairs]
+        axis.axis("off")
+        axis.set_title(f"Tilted above the reference, lip outside, {title}: drawn / executed, %", fontsize=8)
+        table = axis.table(
+            cells,
+            rowLabels=[" into ".join(pair).replace("_", " ") for pair in pairs],
+            colLabels=[WORDS[features] for features in sets],
+            **{"loc": "center", "cellLoc": "center", "edges": "horizontal"},
+        )
+        table.auto_set_font_size(False)
+        table.set_fontsize(7)
+    return figure
+
+
+def _cell(row: "pd.Series", name: str) -> str:
+    executed = f"{100.0 * row[name]:.0f}" if row[name] == row[name] else "–"
+    return f"{100.0 * row['drawn_' + name]:.1f} / {executed}"
 
 
 def _successes(axis: "Axes", rows: "pd.DataFrame", at: list[float], style: dict, word: str) -> None:
     rate = 100.0 * (rows["successes"] / rows["n"]).to_numpy()
     low, high = 100.0 * np.array([wilson(row.successes, row.n) for row in rows.itertuples()]).T
     axis.hlines(at, low, high, color=style["color"], lw=0.8)
+    axis.plot(100.0 * rows["first_successes"] / rows["n"], at, **style, mfc="none")
     axis.plot(rate, at, **style, label=word)

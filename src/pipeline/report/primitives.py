@@ -1,5 +1,6 @@
 """Draw the distributions of pours, as the paper's Fig. 4: mean, two standard deviations, lines at one, where the lip is inside."""
 
+import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,9 @@ def main() -> None:
     for option in ("--primitives", "--trajectories"):
         parser.add_argument(option, type=Path, nargs="+", required=True, help="one file a feature set")
     parser.add_argument("--prior-demonstrations", type=float, default=5.0, help="as the primitives have it")
+    parser.add_argument("--conditioned", type=Path, help="the primitive that is conditioned on the pair")
+    parser.add_argument("--parameters", type=Path, help="warped parameters of all objects, for that one")
+    parser.add_argument("--pairs", nargs="*", default=[], metavar="HELD/TARGET", help="that it is shown for")
     parser.add_argument("--pages", type=Path, required=True)
     parser.add_argument("--numbers", type=Path, required=True)
     options = parser.parse_args()
@@ -48,8 +52,23 @@ def main() -> None:
         ones = ruler if learnt["features"] == "standard" else np.ones(4)
         pages.append(draw(promp, table, learnt, ones))
         found |= numbers(promp, table, learnt, options.prior_demonstrations)
+    if options.conditioned:
+        scaled = {one["features"]: promp for one, promp in zip(about, primitives, strict=True)}[
+            "label_mapping"
+        ]
+        pages.append(_conditioned(options, scaled))
     save(pages, options.pages)
     write_json(options.numbers, found)
+
+
+def _conditioned(options: argparse.Namespace, scaled: "ProMP") -> "Figure":
+    from pipeline.motion.conditioned import ConditionedProMP
+    from pipeline.report import conditioned_page
+
+    learnt = ConditionedProMP.from_json(read_json(options.conditioned), str(options.conditioned))
+    parameters = read_table(options.parameters, "parameters")
+    pairs = [(held, target) for held, target in (pair.split("/") for pair in options.pairs)]
+    return conditioned_page.draw(learnt, scaled, parameters, pairs)
 
 
 def draw(promp: "ProMP", shown: "pd.DataFrame", about: dict[str, Any], ones: np.ndarray) -> "Figure":

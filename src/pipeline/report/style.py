@@ -14,12 +14,14 @@ COLOURS = {
     "label_mapping": "#0072B2",
     "point_mapping": "#D55E00",
     "standard": "#009E73",
+    "conditioned": "#CC79A7",
     "hydrostatic": "#7F7F7F",
 }
 WORDS = {
     "label_mapping": "label mapping",
     "point_mapping": "point mapping",
     "standard": "standard features",
+    "conditioned": "conditioned on the pair",
     "hydrostatic": "hydrostatic ceiling",
 }
 RC: Any = {

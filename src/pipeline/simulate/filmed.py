@@ -1,6 +1,8 @@
 """Where the balls are in each frame of a film, as they are carried and as they fly: one execution again, watched."""
 
+import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -8,6 +10,9 @@ from pipeline import artefacts, command
 from pipeline.simulate import carry
 from pipeline.simulate.carrying import carry as carried
 from pipeline.simulate.carrying import motion
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 NOWHERE = np.zeros((0, 3))
 
@@ -45,24 +50,33 @@ def main() -> None:
     options = parser.parse_args()
 
     run = carry.first(options.trajectories, options.features)
+    artefacts.write_arrays(options.film, _filmed(options, run) if len(run) else _nothing(options))
+
+
+def _filmed(options: argparse.Namespace, run: "pd.DataFrame") -> artefacts.Arrays:
     draw = int(run["draw"].iloc[0])
     held, second = carry.pots(options, artefacts.read_arrays(options.target[1]))
     T_world_held, T_world_second = artefacts.poses(run), artefacts.T_world_second(run)
     time_s = run["t_s"].to_numpy()
     moving = motion(T_world_held, float(time_s[1] - time_s[0]), held.matter.step_s)
     recorder = Recorder(1.0 / options.frames_a_second)
-    seed = options.seed + draw
     watch = recorder.of(0), recorder.of(1)
-    carried(held, second, moving, T_world_second, options.balls, seed, watch)
+    carried(held, second, moving, T_world_second, options.balls, options.seed + draw, watch)
     frames = recorder.frames(int(time_s[-1] * options.frames_a_second) + 1)
-    arrays = {
+    return {
         "balls_m": np.concatenate(frames),
         "counts": np.array([len(frame) for frame in frames]),
         "radius_m": np.array(held.radius_m),
         "draw": np.array(draw),
         "every_s": np.array(recorder.every_s),
     }
-    artefacts.write_arrays(options.film, arrays)
+
+
+def _nothing(options: argparse.Namespace) -> artefacts.Arrays:
+    """Return the film of no execution, as the arm could follow no sample: no frames, draw -1."""
+    every_s = np.array(1.0 / options.frames_a_second)
+    none = {"counts": np.zeros(0, int), "radius_m": np.array(0.0), "draw": np.array(-1)}
+    return {"balls_m": NOWHERE, "every_s": every_s, **none}
 
 
 if __name__ == "__main__":

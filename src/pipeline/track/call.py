@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.track import facts
+from pipeline.track.executed import executed_runs
 from pipeline.track.failures import Failure, failures, text
 from pipeline.track.runs import Data, File, Run
 from pipeline.track.stages import failure_tags, jobs, spent, stage_runs
@@ -54,7 +55,7 @@ def call_run(call: Call) -> Run:
         found = {key: value for key, value, _ in stage.metrics}
         numbers |= {f"{what}.{stage.tags['stage']}": found[what] for what in ("seconds", "cpu_seconds")}
     run.metrics = [(key, value, 0) for key, value in numbers.items()]
-    run.nested += _classifiers(call, flat)
+    run.nested += _classifiers(call, flat) + _executions(call, flat)
     for nested in run.nested:
         nested.tags |= origin
     return run
@@ -85,6 +86,13 @@ def _classifiers(call: Call, flat: dict[str, Any]) -> list[Run]:
     reported = facts.made(Path(call.reports) / "roc.pdf", call.since_s)
     fresh = [path.parent.name for path in found if reported or facts.made(path, call.since_s)]
     return [run for name in fresh for run in trained_runs(call.processed, name, flat)]
+
+
+def _executions(call: Call, flat: dict[str, Any]) -> list[Run]:
+    """Return the runs of the robot's executions, if this call made them or their report."""
+    path = Path(call.processed) / "execute/executions.parquet"
+    fresh = path.is_file() and facts.made(Path(call.reports) / "execution.pdf", call.since_s)
+    return executed_runs(call.processed, flat) if fresh or facts.made(path, call.since_s) else []
 
 
 def _note(call: Call, failed: list[Failure]) -> str:

@@ -160,7 +160,10 @@ class Recorder:
     def _known(self, call: Run) -> list[Any]:
         """Return the runs of this workspace that are written once."""
         where = _quoted(call.tags.get("workspace", ""))
-        return self._found(f"tags.kind = 'classifier' AND tags.workspace = {where}")
+        kinds = ("classifier", "execution")
+        return [
+            run for kind in kinds for run in self._found(f"tags.kind = '{kind}' AND tags.workspace = {where}")
+        ]
 
     def _found(self, condition: str) -> list[Any]:
         found, token = [], None

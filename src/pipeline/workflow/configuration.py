@@ -137,6 +137,18 @@ def _check_pairs(config: dict) -> None:
             f"fuse.truncation_m: expected at least two voxels ({2 * voxel_m} m), found {truncation_m}; "
             "raise it or lower fuse.voxel_m"
         )
+    _check_shown(config["primitives"]["pairs"], config["execute"]["pairs"])
+
+
+def _check_shown(shown: list[str], executed: list[str]) -> None:
+    if len(shown) == 1:
+        raise PipelineError(
+            f"primitives.pairs: expected two pairs at least or none, found {shown[0]} alone; add another or take it out"
+        )
+    if both := sorted(set(shown) & set(executed)):
+        raise PipelineError(
+            f"primitives.pairs: expected pairs that are not tested in execute.pairs, found {both[0]} in both; take it out of one"
+        )
 
 
 def _below(key: str, value: float, other: str, limit: float) -> None:

@@ -145,8 +145,9 @@ def _check_roles(config: dict, found: Objects, exclude: set[str]) -> None:
     roles += [
         ("simulate.filling.held_objects", name) for name in config["simulate"]["filling"]["held_objects"]
     ]
-    for pair in config.get("execute", {}).get("pairs", []):
-        roles += [("execute.pairs", name) for name in pair.split("/")]
+    for stage in ("execute", "primitives"):
+        for pair in config.get(stage, {}).get("pairs", []):
+            roles += [(f"{stage}.pairs", name) for name in pair.split("/")]
     for key, name in roles:
         if name in exclude:
             raise PipelineError(

@@ -48,6 +48,11 @@ FIGURES = {
         "Pours that the simulated robot executed with the demonstrated pair and with novel objects, as the paper's Fig. 5; how "
         "often they succeeded is on the further page.",
     ),
+    "watching": (
+        "Does it know when it pours?",
+        "What the classifiers say along each executed pour: the probability that the cup pours, and that what it pours ends in the "
+        "second container, against the first ball and the first drop of liquid.",
+    ),
     "physics": (
         "Is the liquid one?",
         "The simulated liquid against hydrostatics: density, level, capacity, spill angle and retained volume; the same trials "
