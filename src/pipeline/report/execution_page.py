@@ -84,9 +84,7 @@ def rates(executions: "pd.DataFrame", safety: "pd.DataFrame") -> "Figure":
             range(len(pairs)), [f"{held} into {target}".replace("_", " ") for held, target in pairs]
         )
         axes[0].invert_yaxis()
-        axes[0].set_xlabel(
-            "executions that succeeded, %\n(bars: 95 %, Wilson; open: a refused\nsample counts as a failure)"
-        )
+        axes[0].set_xlabel("executions that succeeded, %\n(bars: 95 %; open: refused\nsamples are failures)")
         axes[1].set_xlabel("balls beside the target,\n% of those in the cup")
         axes[2].set_xlabel("tilted above the reference,\nlip outside, % of executions\n(open: way back, too)")
         for axis in axes:
@@ -105,14 +103,14 @@ def safety_table(safety: "pd.DataFrame") -> "Figure":
     rows = safety.set_index([*PAIR, "features"])
     with plt.rc_context(RC):
         figure, axes = plt.subplots(2, 1, figsize=(7.2, 1.5 + 0.36 * len(pairs)), layout="constrained")
-    titles = (
-        "until the lip first comes above the opening",
-        "at any time, the way back with an empty cup too",
+    titles = ("until the lip has come above the opening", "at any time, the way back with an empty cup too")
+    figure.suptitle(
+        "Tilted above the reference with the lip outside the opening, % of drawn / executed pours", fontsize=8
     )
     for axis, name, title in zip(axes, ("way_in", "ever"), titles, strict=True):
         cells = [[_cell(rows.loc[(*pair, features)], name) for features in sets] for pair in pairs]
         axis.axis("off")
-        axis.set_title(f"Tilted above the reference, lip outside, {title}: drawn / executed, %", fontsize=8)
+        axis.set_title(title, fontsize=8, loc="left")
         table = axis.table(
             cells,
             rowLabels=[" into ".join(pair).replace("_", " ") for pair in pairs],
