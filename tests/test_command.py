@@ -18,9 +18,11 @@ def test_a_log_has_the_step_that_takes_long(capsys):
     with command.steps("fusing mug", 3, every_s=0.02) as tell:
         tell("reading")
         tell("the surface")
-        while not (said := capsys.readouterr().err):
+        said = ""
+        while "surface" not in said:
+            said += capsys.readouterr().err
             time.sleep(0.01)
-    assert said.startswith("fusing mug: the surface (step 2 of 3, 0 s so far)\n")
+    assert "fusing mug: the surface (step 2 of 3, " in said
     assert threading.active_count() == before
 
 

@@ -26,7 +26,6 @@ MADE_BY = {
     "reports/ablations.pdf": "report/test_evaluation.py::test_ablations_are_compared_with_the_default_replicate_by_replicate",
     "reports/sources.pdf": "report/test_sources.py::test_the_page_has_every_error_in_its_unit_and_names_who_was_annotated",
     'reports/metrics.json --config "warp={method: cpd}"': "warp/test_methods.py::test_labels_arrive_and_no_wall_is_crossed",
-    'reports/metrics.json --config "warp={refinements: 0, bends: 0}"': ALL,
 }
 
 

@@ -3,6 +3,7 @@
 import ast
 import json
 import re
+import runpy
 import shutil
 from pathlib import Path
 
@@ -115,6 +116,12 @@ def test_snakemake_can_make_every_target(clone):
     for words in (" ".join(plain), *sorted(asked - set(plain))):
         told = clone.bash(f"snakemake -n {words} --quiet rules")
         assert told.returncode == 0, f"{words}\n{told.stderr}"
+
+
+def test_the_picture_of_the_rules_is_that_of_the_workflow(clone):
+    drawn = runpy.run_path(str(ROOT / "docs/rulegraph.py"))
+    now = drawn["svg"](drawn["rules"](clone.folder))
+    assert (ROOT / "docs/rulegraph.svg").read_text() == now, "run: python docs/rulegraph.py"
 
 
 @pytest.mark.parametrize(

@@ -27,6 +27,8 @@ NUMBERS = {
     "classify.pouring.label_mapping.novel.auc": 0.98,
     "classify.pouring.label_mapping.novel.tpr_at_fpr_01": 0.8,
     "classify.pouring.standard.novel.auc": 0.9,
+    "classify.filling.hydrostatic.novel.auc": 0.96,
+    "classify.filling.hydrostatic.same.auc": 0.961,
     "classify.filling.standard.novel.auc": 0.75,
     "classify.filling.standard.same.auc": 0.85,
     "evaluation.filling.standard.novel.auc.low": 0.699,
