@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pipeline.fuse.cloud import vertex_normals
+from pipeline.fuse.smoothing import vertex_normals
 from pipeline.fuse.tsdf import Surface
 from pipeline.geometry.sampling import triangle_areas_and_normals
 

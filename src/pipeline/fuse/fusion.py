@@ -11,13 +11,13 @@ from pipeline.artefacts import Mesh
 from pipeline.errors import PipelineError
 from pipeline.fuse import coverage, dropped, layouts, recorded, tsdf
 from pipeline.fuse.cloud import cloud
-from pipeline.geometry.surface import Surface
+from pipeline.geometry.sampling import triangle_areas_and_normals
+from pipeline.geometry.surface import Surface, is_closed
 
 LEAST_POINTS = 5000
 # A surface further than this from half of its own measurements was fused from views that do not fit together.
 LARGEST_RESIDUAL_M = 0.003
-_RESIDUAL_POINTS = 20_000
-_SMOOTH_FUSED, _SMOOTH_DROPPED = 2, 0
+_RESIDUAL_POINTS = 8_000
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ def fused(folder: Path, *, voxel_m: float, truncation_m: float, n_points: int, s
         vertices, triangles, T_object_world, facts = dropped.read(raw, rng)
         every = np.ones(len(vertices), bool)
         surface = tsdf.Surface(vertices, triangles, every, ~every)
-        return _result(surface, n_points, _SMOOTH_DROPPED, rng, facts | _mesh_facts(T_object_world, raw))
+        return _result(surface, n_points, False, rng, facts | _mesh_facts(T_object_world, raw))
     scan = recorded.located(raw, str(folder), rng)
     surface = tsdf.fuse(scan.views, scan.placement, voxel_m, truncation_m, str(folder))
     recorded.check_registered(scan, surface.vertices_m, surface.seen, str(folder))
@@ -51,22 +51,19 @@ def fused(folder: Path, *, voxel_m: float, truncation_m: float, n_points: int, s
     facts = scan.facts() | _residuals(scan, surface, str(folder), rng)
     facts |= {"seen": shares, "floor_closed_by_table_m2": surface.table_closed_m2}
     return replace(
-        _result(surface, n_points, _SMOOTH_FUSED, rng, facts), complaints=tuple(coverage.complaints(shares))
+        _result(surface, n_points, True, rng, facts), complaints=tuple(coverage.complaints(shares))
     )
 
 
 def _result(
-    surface: tsdf.Surface, n_points: int, smooth: int, rng: np.random.Generator, facts: dict[str, Any]
+    surface: tsdf.Surface, n_points: int, was_fused: bool, rng: np.random.Generator, facts: dict[str, Any]
 ) -> Fused:
-    import trimesh
-
-    points = cloud(surface.vertices_m, surface.triangles, surface.seen, n_points, smooth, rng)
-    mesh = trimesh.Trimesh(surface.vertices_m, surface.triangles, process=False)
+    points = cloud(surface.vertices_m, surface.triangles, surface.seen, n_points, was_fused, rng)
     report = {
         "share_seen": float(points.seen.mean()),
-        "watertight": bool(mesh.is_watertight),
+        "watertight": is_closed(surface.triangles),
         "n_triangles": len(surface.triangles),
-        "area_m2": float(mesh.area),
+        "area_m2": float(triangle_areas_and_normals(surface.vertices_m, surface.triangles)[0].sum()),
     }
     return Fused((surface.vertices_m, surface.triangles), points, facts | report)
 

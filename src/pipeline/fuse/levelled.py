@@ -85,7 +85,7 @@ def _points(views: Views, i: int, place) -> tuple[np.ndarray, np.ndarray]:  # ty
 
 def _even(points: np.ndarray, intensity: np.ndarray, eye: np.ndarray) -> tuple[np.ndarray, ...]:
     """Return evenly spaced points, their normals towards the camera, intensities; without edges where there is neither."""
-    import open3d as o3d
+    from pipeline.geometry.open3d_core import open3d as o3d
 
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
     cloud.colors = o3d.utility.Vector3dVector(np.repeat(intensity[:, None], 3, axis=1))

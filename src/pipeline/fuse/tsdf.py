@@ -128,7 +128,7 @@ def _marched(
     value: np.ndarray, lowest: np.ndarray, voxel_m: float, expected: str
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the surface where the values (nx, ny, nz) change their sign, by marching cubes in the blocks that need it."""
-    import open3d as o3d
+    from pipeline.geometry.open3d_core import open3d as o3d
 
     value = np.where(np.abs(value) < _LEAST_VALUE, np.copysign(_LEAST_VALUE, value), value).astype(np.float32)
     nx, ny, nz = (n // BLOCK for n in value.shape)
