@@ -8,7 +8,7 @@ import pytest
 import trimesh
 from fuse import scenes
 
-from pipeline.fuse import coverage, tsdf
+from pipeline.fuse import coverage, tsdf, walls
 from pipeline.fuse.measuring import signed_distances
 from pipeline.fuse.placement import find
 from pipeline.fuse.raw import Views
@@ -86,6 +86,30 @@ def test_a_truncation_of_ten_walls_changes_little(bowl):
     far, _ = fused(bowl.views, 0.015)
     cup, near = (cavity(s.vertices_m, s.triangles, name="bowl") for s in (far, bowl.surface))
     assert cup.capacity_m3 == pytest.approx(near.capacity_m3, rel=0.03)
+
+
+def test_a_wall_too_thin_for_the_camera_is_closed_and_named():
+    cup = thin(38, 40, 60, 0.8, 2.5)
+    surface, _ = fused(scenes.views(cup)[0])
+    found, true = (cavity(b.vertices_m, b.triangles, name="cup").capacity_m3 for b in (surface, cup))
+    assert found == pytest.approx(true, rel=0.03)
+    assert surface.thickened_share > coverage.MUCH_THICKENED
+    told = coverage.complaints({}, surface.thickened_share)
+    assert "too thin for this camera" in told[0]
+
+
+def test_crossing_sides_are_parted():
+    """Two sheets of triangles, the outer one 1 mm on the wrong side of the inner one."""
+    grid = np.stack(np.meshgrid(np.arange(5.0), np.arange(5.0), indexing="ij"), axis=-1).reshape(-1, 2) * 1e-3
+    quads = np.array([(i, i + 5, i + 6, i + 1) for i in range(19) if i % 5 < 4])
+    up = np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]])
+    places = np.concatenate([np.column_stack([grid, np.full(25, z)]) for z in (0.0, -0.001)])
+    triangles = np.concatenate([up[:, ::-1], up + 25])
+    outer = np.arange(50) >= 25
+    vertices, share = walls.parted(places, triangles, ~outer, outer)
+    assert share == 1.0
+    np.testing.assert_allclose(vertices[outer, 2], walls.LEAST_WALL_M)
+    np.testing.assert_array_equal(vertices[~outer], places[~outer])
 
 
 def without_floor(views: Views, T_world_object: np.ndarray, radius_m: float) -> Views:

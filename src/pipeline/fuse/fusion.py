@@ -49,10 +49,13 @@ def fused(folder: Path, *, voxel_m: float, truncation_m: float, n_points: int, s
     recorded.check_registered(scan, surface.vertices_m, surface.seen, str(folder))
     shares = coverage.shares_seen(surface)
     facts = scan.facts() | _residuals(scan, surface, str(folder), rng)
-    facts |= {"seen": shares, "floor_closed_by_table_m2": surface.table_closed_m2}
-    return replace(
-        _result(surface, n_points, True, rng, facts), complaints=tuple(coverage.complaints(shares))
-    )
+    facts |= {
+        "seen": shares,
+        "floor_closed_by_table_m2": surface.table_closed_m2,
+        "wall_thickened_share": surface.thickened_share,
+    }
+    told = coverage.complaints(shares, surface.thickened_share)
+    return replace(_result(surface, n_points, True, rng, facts), complaints=tuple(told))
 
 
 def _result(
