@@ -12,6 +12,7 @@ from PIL import Image
 
 from pipeline.errors import PipelineError
 from pipeline.fuse.fusion import fused
+from pipeline.scan.shapes import shape
 
 OPTIONS = {"voxel_m": 0.002, "truncation_m": 0.004, "n_points": 5000, "seed": 2}
 
@@ -166,6 +167,30 @@ def test_wrong_scan_yaml(tmp_path, text, named):
     box(tmp_path / "cup" / "cup.ply")
     (tmp_path / "cup" / "scan.yaml").write_text(text)
     refused(tmp_path / "cup", "scan.yaml", named)
+
+
+@pytest.mark.parametrize("key", ["up: y", "wall_mm: 3", "turntable_deg: [0, 10]"])
+def test_keys_without_effect_on_views_are_refused(folder, key):
+    (folder / "scan.yaml").write_text(f"{key}\n")
+    refused(folder, "scan.yaml", f"no `{key.split(':')[0]}` for", "remove it")
+
+
+@pytest.mark.parametrize("key", ["depth_scale: 1000", "turntable_deg: [0]"])
+def test_keys_without_effect_on_meshes_are_refused(tmp_path, key):
+    box(tmp_path / "cup" / "cup.ply")
+    (tmp_path / "cup" / "scan.yaml").write_text(f"{key}\n")
+    refused(tmp_path / "cup", "scan.yaml", f"no `{key.split(':')[0]}` for a mesh", "remove it")
+
+
+def test_a_wall_is_only_given_to_what_has_none(tmp_path):
+    (tmp_path / "cup").mkdir()
+    cup = shape("small_cup")
+    trimesh.Trimesh(cup.vertices_m, cup.triangles, process=False).export(tmp_path / "cup" / "cup.ply")
+    (tmp_path / "cup" / "scan.yaml").write_text("wall_mm: 3\n")
+    refused(tmp_path / "cup", "found a wall with two sides", "remove `wall_mm`")
+    np.savez(tmp_path / "cup" / "cup.npz", points=cup.vertices_m)
+    (tmp_path / "cup" / "cup.ply").unlink()
+    refused(tmp_path / "cup", "scan.yaml", "no `wall_mm` for a point cloud")
 
 
 def test_the_command_says_one_sentence_and_writes_nothing(tmp_path):

@@ -6,15 +6,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import trimesh
+from fuse import scenes
 
-from pipeline.fuse import coverage, tsdf
+from pipeline.fuse import coverage, tsdf, walls
 from pipeline.fuse.measuring import signed_distances
 from pipeline.fuse.placement import find
-from pipeline.fuse.raw import Options, Views
+from pipeline.fuse.raw import Views
 from pipeline.geometry import frames
 from pipeline.geometry.cavity import cavity
 from pipeline.geometry.surface import Surface
-from pipeline.scan import camera, recording
 
 VOXEL_M, TRUNCATION_M = 0.00125, 0.0025
 
@@ -39,23 +39,6 @@ def thin(foot_mm: float, lip_mm: float, height_mm: float, wall_mm: float, floor_
     )
 
 
-def scanned(body: SimpleNamespace, views: int = 36) -> tuple[Views, np.ndarray]:
-    T_world_object = recording.pose_on_table(recording.generator(1, body.name, 0))
-    pairs = recording.views(body, T_world_object, views, 0.6, 1.0, 1)
-    depths = [(depth_mm / np.float32(1000)).astype(np.float32) for depth_mm, _ in pairs]
-    return Views(
-        depths,
-        [pose for _, pose in pairs],
-        np.stack([camera.intrinsics()] * len(depths)),
-        [f"frame-{number:06d}" for number in range(len(depths))],
-        "7-scenes",
-        Options(),
-        [],
-        1000.0,
-        len(depths),
-    ), T_world_object
-
-
 def fused(views: Views, truncation_m: float = TRUNCATION_M) -> tuple[tsdf.Surface, np.ndarray]:
     _, placement = find(views, "thin", np.random.default_rng(2))
     return tsdf.fuse(views, placement, VOXEL_M, truncation_m, "thin"), placement.T_object_world
@@ -70,9 +53,10 @@ def wall_mm(surface: Surface, middle: np.ndarray) -> np.ndarray:
 @pytest.fixture(scope="module")
 def bowl():
     body = thin(30, 75, 55, 1.5, 2.5)
-    views, T_world_object = scanned(body)
+    views, T_world_object = scenes.views(body)
     surface, T_object_world = fused(views)
-    return SimpleNamespace(body=body, views=views, surface=surface, T=T_object_world @ T_world_object)
+    T = T_object_world @ T_world_object
+    return SimpleNamespace(body=body, views=views, surface=surface, T_world_object=T_world_object, T=T)
 
 
 def test_a_thin_bowl_keeps_capacity_radius_height_and_wall(bowl):
@@ -104,6 +88,30 @@ def test_a_truncation_of_ten_walls_changes_little(bowl):
     assert cup.capacity_m3 == pytest.approx(near.capacity_m3, rel=0.03)
 
 
+def test_a_wall_too_thin_for_the_camera_is_closed_and_named():
+    cup = thin(38, 40, 60, 0.8, 2.5)
+    surface, _ = fused(scenes.views(cup)[0])
+    found, true = (cavity(b.vertices_m, b.triangles, name="cup").capacity_m3 for b in (surface, cup))
+    assert found == pytest.approx(true, rel=0.03)
+    assert surface.thickened_share > coverage.MUCH_THICKENED
+    told = coverage.complaints({}, surface.thickened_share)
+    assert "too thin for this camera" in told[0]
+
+
+def test_crossing_sides_are_parted():
+    """Two sheets of triangles, the outer one 1 mm on the wrong side of the inner one."""
+    grid = np.stack(np.meshgrid(np.arange(5.0), np.arange(5.0), indexing="ij"), axis=-1).reshape(-1, 2) * 1e-3
+    quads = np.array([(i, i + 5, i + 6, i + 1) for i in range(19) if i % 5 < 4])
+    up = np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]])
+    places = np.concatenate([np.column_stack([grid, np.full(25, z)]) for z in (0.0, -0.001)])
+    triangles = np.concatenate([up[:, ::-1], up + 25])
+    outer = np.arange(50) >= 25
+    vertices, share = walls.parted(places, triangles, ~outer, outer)
+    assert share == 1.0
+    np.testing.assert_allclose(vertices[outer, 2], walls.LEAST_WALL_M)
+    np.testing.assert_array_equal(vertices[~outer], places[~outer])
+
+
 def without_floor(views: Views, T_world_object: np.ndarray, radius_m: float) -> Views:
     """The same views, but nothing comes back from a disc in the middle of the floor."""
     depths = []
@@ -120,8 +128,7 @@ def without_floor(views: Views, T_world_object: np.ndarray, radius_m: float) -> 
 
 def test_a_floor_that_nobody_saw_is_no_drain(bowl):
     """Black in the middle: what is unseen stays closed, and the share seen says so."""
-    T_world_object = recording.pose_on_table(recording.generator(1, bowl.body.name, 0))
-    surface, _ = fused(without_floor(bowl.views, T_world_object, 0.012))
+    surface, _ = fused(without_floor(bowl.views, bowl.T_world_object, 0.012))
     cup = cavity(surface.vertices_m, surface.triangles, name="bowl")
     true = cavity(bowl.body.vertices_m, bowl.body.triangles, name="bowl")
     assert cup.capacity_m3 == pytest.approx(true.capacity_m3, rel=0.05)
@@ -131,7 +138,7 @@ def test_a_floor_that_nobody_saw_is_no_drain(bowl):
 
 def test_the_table_closes_a_ring_without_a_floor():
     ring = thin(35, 38, 50, 2.0, 0.0)
-    surface, _ = fused(scanned(ring, 24)[0])
+    surface, _ = fused(scenes.views(ring, 24)[0])
     assert surface.table_closed_m2 == pytest.approx(np.pi * 0.033**2, rel=0.15)
     cup = cavity(surface.vertices_m, surface.triangles, name="ring")
     assert cup.capacity_m3 == pytest.approx(

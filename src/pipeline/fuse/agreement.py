@@ -87,9 +87,10 @@ class Sample:
 def _sample(views: Views, rng: np.random.Generator) -> Sample:
     points = []
     for depth, K in zip(views.depths_m, views.intrinsics, strict=True):
-        v, u = np.nonzero(depth)
-        chosen = rng.integers(len(v), size=POINTS) if len(v) else np.zeros(0, int)
-        points.append(unprojected(u[chosen], v[chosen], depth[v[chosen], u[chosen]], K))
+        known = np.flatnonzero(depth)
+        chosen = rng.integers(len(known), size=POINTS) if len(known) else np.zeros(0, int)
+        v, u = np.divmod(known[chosen], depth.shape[1])
+        points.append(unprojected(u, v, depth[v, u], K))
     n = len(points)
     pairs = np.array([(i, j) for i in range(n) for j in range(n) if i != j])
     if len(pairs) > PAIRS:

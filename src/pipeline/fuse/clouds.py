@@ -76,7 +76,7 @@ def _arrays(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
 
 
 def _open3d(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
-    import open3d as o3d
+    from pipeline.geometry.open3d_core import open3d as o3d
 
     with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
         try:
@@ -119,7 +119,7 @@ def meshed(points: np.ndarray, normals: np.ndarray | None, file: str) -> tuple[M
 
 def _thinned(points: np.ndarray, normals: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None]:
     """Return the points without stray ones (Open3D's statistical filter), and not more of them than needed."""
-    import open3d as o3d
+    from pipeline.geometry.open3d_core import open3d as o3d
 
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
     if normals is not None:
@@ -146,7 +146,7 @@ def _base(points: np.ndarray, spacing: float) -> np.ndarray:
 
 def _axes(points: np.ndarray) -> np.ndarray:
     """Return unit normals (N, 3) of planes through each point's neighbours, either way round."""
-    import open3d as o3d
+    from pipeline.geometry.open3d_core import open3d as o3d
 
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
     cloud.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(NEIGHBOURS))
@@ -179,7 +179,7 @@ def _far_m(points: np.ndarray, axes: np.ndarray, reach: float) -> list[np.ndarra
 
 
 def _poisson(points: np.ndarray, normals: np.ndarray) -> Mesh:
-    import open3d as o3d
+    from pipeline.geometry.open3d_core import open3d as o3d
 
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
     cloud.normals = o3d.utility.Vector3dVector(normals)

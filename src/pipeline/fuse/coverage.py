@@ -3,12 +3,14 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pipeline.fuse.cloud import vertex_normals
+from pipeline.fuse import walls
+from pipeline.fuse.smoothing import vertex_normals
 from pipeline.fuse.tsdf import Surface
 from pipeline.geometry.sampling import triangle_areas_and_normals
 
 RIM_M = 0.004  # from the edge between inside and outside, as everywhere
 FLOOR_COSINE = 0.7  # what faces up within 45° is floor
+MUCH_THICKENED = 0.01  # of the outside: is named
 POOR = 0.8  # a part of which less was seen is named
 
 
@@ -40,8 +42,8 @@ def shares_seen(surface: Surface) -> dict[str, float | None]:
     return shares
 
 
-def complaints(shares: dict[str, float | None]) -> list[str]:
-    """Return one sentence for each part that was poorly seen or not at all."""
+def complaints(shares: dict[str, float | None], thickened_share: float = 0.0) -> list[str]:
+    """Return one sentence for each part that was poorly seen or not at all, and one for a wall that had to be thickened."""
     told = []
     for name, share in shares.items():
         what = name.replace("_", " ")
@@ -49,6 +51,11 @@ def complaints(shares: dict[str, float | None]) -> list[str]:
             told.append(f"the {what} was not seen at all: dark or shiny, or no view from high enough")
         elif share < POOR:
             told.append(f"the {what} was poorly seen, {share:.0%} of it; the rest is closed by guess")
+    if thickened_share > MUCH_THICKENED:
+        told.append(
+            f"the wall is too thin for this camera: {thickened_share:.0%} of the outside was moved to be "
+            f"{walls.LEAST_WALL_M * 1e3:.1f} mm from the inside"
+        )
     return told
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.errors import PipelineError
-from pipeline.fuse import clouds, drains, mending, standing
+from pipeline.fuse import clouds, drains, mending, raw, standing
 from pipeline.fuse.raw import UPS, DroppedMesh
 from pipeline.fuse.wrapping import Mesh, wrapped
 from pipeline.geometry import frames
@@ -16,6 +16,7 @@ from pipeline.geometry.sampling import uniform_points
 LARGEST_M, SMALLEST_M = 2.0, 0.005
 CLOUDS = (".pcd", ".npz")
 TABLE_SAMPLES = 100_000
+_OF_IMAGES = {"depth_scale": "it has no depth images", "turntable_deg": "it has no views"}
 
 
 def read(
@@ -25,6 +26,7 @@ def read(
 
     The world is the file's own frame in metres. The mesh stands with its lowest point on z = 0, over the origin.
     """
+    raw.refuse(dropped.options, dropped.path.parent / "scan.yaml", "a mesh or a point cloud", **_OF_IMAGES)
     mesh = None if dropped.path.suffix.lower() in CLOUDS else _load(dropped.path)
     if mesh is None:
         (vertices, triangles), T_object_world, facts = _from_points(dropped, rng)
@@ -47,6 +49,7 @@ def _from_mesh(
         sample, _ = uniform_points(*mending.arrays(mesh), TABLE_SAMPLES, rng)
         place = standing.found(sample, True, file, rng)
         if place is not None:
+            _refuse_up(dropped)
             mesh.update_faces(standing.belongs(np.asarray(mesh.vertices), place)[mesh.faces].all(axis=1))
             T_object_world, up = place.T_object_world, "z"
     mesh.vertices = frames.apply(T_object_world, mesh.vertices)
@@ -60,12 +63,15 @@ def _from_points(dropped: DroppedMesh, rng: np.random.Generator) -> tuple[Mesh, 
     import trimesh
 
     file, options = str(dropped.path), dropped.options
+    reason = "its points show both sides of the wall"
+    raw.refuse(options, dropped.path.parent / "scan.yaml", "a point cloud", wall_mm=reason)
     points, normals = clouds.read(dropped.path)
     points = points * (options.unit_m or 1.0)
     _check_size(points, dropped.path)
     up, place = options.up or "z", standing.found(points, options.on_table, file, rng)
     T_object_world = upright(points, up)
     if place is not None:
+        _refuse_up(dropped)
         own = standing.belongs(points, place)
         points, normals = points[own], None if normals is None else normals[own]
         T_object_world, up = place.T_object_world, "z"
@@ -88,6 +94,11 @@ def _from_points(dropped: DroppedMesh, rng: np.random.Generator) -> tuple[Mesh, 
         )
     facts = {"layout": "cloud", "n_views": 0, "cloud": found, "mended": facts | done}
     return whole, T_object_world, facts | {"table_cut_away": place is not None}
+
+
+def _refuse_up(dropped: DroppedMesh) -> None:
+    file = dropped.path.parent / "scan.yaml"
+    raw.refuse(dropped.options, file, "a scan that holds its table", up="up comes from the table")
 
 
 def _load(path: Path) -> Any:

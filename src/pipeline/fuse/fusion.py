@@ -13,13 +13,13 @@ from pipeline.command import untold
 from pipeline.errors import PipelineError
 from pipeline.fuse import coverage, dropped, layouts, recorded, tsdf
 from pipeline.fuse.cloud import cloud
-from pipeline.geometry.surface import Surface
+from pipeline.geometry.sampling import triangle_areas_and_normals
+from pipeline.geometry.surface import Surface, is_closed
 
 LEAST_POINTS = 5000
 # A surface further than this from half of its own measurements was fused from views that do not fit together.
 LARGEST_RESIDUAL_M = 0.003
-_RESIDUAL_POINTS = 20_000
-_SMOOTH_FUSED, _SMOOTH_DROPPED = 2, 0
+_RESIDUAL_POINTS = 8_000
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def fused(
         vertices, triangles, T_object_world, facts = dropped.read(raw, rng)
         every = np.ones(len(vertices), bool)
         surface = tsdf.Surface(vertices, triangles, every, ~every)
-        return _result(surface, n_points, _SMOOTH_DROPPED, rng, facts | _mesh_facts(T_object_world, raw))
+        return _result(surface, n_points, False, rng, facts | _mesh_facts(T_object_world, raw))
     tell("poses, table and object")
     scan = recorded.located(raw, str(folder), rng)
     tell("the surface")
@@ -64,24 +64,24 @@ def fused(
     tell("how well it fits, points on it")
     shares = coverage.shares_seen(surface)
     facts = scan.facts() | _residuals(scan, surface, str(folder), rng)
-    facts |= {"seen": shares, "floor_closed_by_table_m2": surface.table_closed_m2}
-    return replace(
-        _result(surface, n_points, _SMOOTH_FUSED, rng, facts), complaints=tuple(coverage.complaints(shares))
-    )
+    facts |= {
+        "seen": shares,
+        "floor_closed_by_table_m2": surface.table_closed_m2,
+        "wall_thickened_share": surface.thickened_share,
+    }
+    told = coverage.complaints(shares, surface.thickened_share)
+    return replace(_result(surface, n_points, True, rng, facts), complaints=tuple(told))
 
 
 def _result(
-    surface: tsdf.Surface, n_points: int, smooth: int, rng: np.random.Generator, facts: dict[str, Any]
+    surface: tsdf.Surface, n_points: int, was_fused: bool, rng: np.random.Generator, facts: dict[str, Any]
 ) -> Fused:
-    import trimesh
-
-    points = cloud(surface.vertices_m, surface.triangles, surface.seen, n_points, smooth, rng)
-    mesh = trimesh.Trimesh(surface.vertices_m, surface.triangles, process=False)
+    points = cloud(surface.vertices_m, surface.triangles, surface.seen, n_points, was_fused, rng)
     report = {
         "share_seen": float(points.seen.mean()),
-        "watertight": bool(mesh.is_watertight),
+        "watertight": is_closed(surface.triangles),
         "n_triangles": len(surface.triangles),
-        "area_m2": float(mesh.area),
+        "area_m2": float(triangle_areas_and_normals(surface.vertices_m, surface.triangles)[0].sum()),
     }
     return Fused((surface.vertices_m, surface.triangles), points, facts | report)
 

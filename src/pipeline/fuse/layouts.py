@@ -16,6 +16,7 @@ MESHES = (".ply", ".obj", ".stl", ".glb", ".off")
 CLOUDS = (".pcd", ".npz")
 RECORDINGS = {"7-scenes": seven_scenes, "open3d": open3d_folders, "tum": tum, "bop": bop}
 MOST_VIEWS = 200
+_OF_OTHERS = {"up": "up comes from the table", "wall_mm": "both sides of the wall are measured"}
 _EXPECTED = (
     "depth images (frame-NNNNNN.depth.png with frame-NNNNNN.pose.txt and camera-intrinsics.txt, or a folder of Open3D, TUM "
     f"or BOP), one mesh {' '.join(MESHES)}, or one point cloud .ply {' '.join(CLOUDS)}"
@@ -33,6 +34,7 @@ def read(folder: Path) -> Views | DroppedMesh:
     layouts = [layout for layout, module in RECORDINGS.items() if module.recognised(folder, names)]
     dropped = [name for name in names if Path(name).suffix.lower() in MESHES + CLOUDS]
     if len(layouts) == 1 and not dropped:
+        raw.refuse(options, folder / "scan.yaml", "depth images", **_OF_OTHERS)
         return _views(folder, layouts[0], names, options)
     if len(dropped) == 1 and not layouts:
         return DroppedMesh(folder / dropped[0], options)
@@ -64,6 +66,10 @@ def _views(folder: Path, layout: str, names: list[str], options: Options) -> Vie
             f"{folder}: expected depth in the images, found zeros in all {len(images)}; record it again"
         )
     poses = [frame.T_world_camera for frame in chosen if frame.T_world_camera is not None]
+    if poses:
+        raw.refuse(
+            options, folder / "scan.yaml", "views with poses", turntable_deg="their poses say how they turn"
+        )
     return Views(
         depths_m=[depth for depth, _ in images],
         T_world_cameras=poses,

@@ -3,32 +3,37 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import ndimage
 
 from pipeline.errors import PipelineError
 from pipeline.fuse import placement
 from pipeline.fuse.agreement import unprojected
 from pipeline.fuse.raw import Views
+from pipeline.fuse.table import Placement
 from pipeline.geometry import frames
 
 VOXEL_M, NORMAL_RADIUS_M = 0.002, 0.006
 LEAST_POINTS = 150
-# A difference of normals of one, or of intensities of one, weighs as much as this distance.
+# A difference of normals of one, or of contrasts of one, weighs as much as this distance.
 NORMAL_M, COLOUR_M = 0.006, 0.030
+# Contrast is intensity less its mean over so many metres: light that stays with the camera of a turntable is no paint.
+SHADE_M = 0.030
 
 
 @dataclass(frozen=True)
 class Levelled:
     """A view (its number among the views) in a frame of its own: z up from the table, the object's axis near the origin.
 
-    points_m (N, 3), normals (N, 3) towards the camera, intensity (N,) or zeros; T_level_camera (4, 4); steepness: sine of
-    the camera's elevation.
+    points_m (N, 3), normals (N, 3) towards the camera, contrast (N,) or zeros; T_level_camera (4, 4); contrasts (H, W) of
+    the object's pixels, NaN elsewhere, or none without colours; steepness: sine of the camera's elevation.
     """
 
     number: int
     points_m: np.ndarray
     normals: np.ndarray
-    intensity: np.ndarray
+    contrast: np.ndarray
     T_level_camera: np.ndarray
+    contrasts: np.ndarray | None = None
 
     @property
     def steepness(self) -> float:
@@ -42,9 +47,9 @@ class Levelled:
         return float(far - median)
 
     def features(self, T: np.ndarray) -> np.ndarray:
-        """Return places, normals and intensities (N, 7) in another level frame, all in metres."""
+        """Return places, normals and contrasts (N, 7) in another level frame, all in metres."""
         return np.column_stack(
-            [frames.apply(T, self.points_m), NORMAL_M * self.normals @ T[:3, :3].T, COLOUR_M * self.intensity]
+            [frames.apply(T, self.points_m), NORMAL_M * self.normals @ T[:3, :3].T, COLOUR_M * self.contrast]
         )
 
 
@@ -58,18 +63,19 @@ def level(views: Views, i: int, name: str, rng: np.random.Generator) -> Levelled
         names=[views.names[i]],
     )
     _, place = placement.find(single, f"{name}, {views.names[i]}", rng)
-    points, intensity = _points(views, i, place)
+    points, contrast, contrasts = _points(views, i, place)
     if len(points) < LEAST_POINTS:
         raise PipelineError(
             f"{name}, {views.names[i]}: expected an object on the table, found {len(points)} points; keep it in view"
         )
-    points, normals, intensity = _even(points, intensity, place.T_object_world[:3, 3])
+    points, normals, contrast = _even(points, contrast, place.T_object_world[:3, 3])
     shift = frames.transform(np.eye(3), np.array([*-axis_of(points, normals), 0.0]))
-    return Levelled(i, frames.apply(shift, points), normals, intensity, shift @ place.T_object_world)
+    T_level_camera = shift @ place.T_object_world
+    return Levelled(i, frames.apply(shift, points), normals, contrast, T_level_camera, contrasts)
 
 
-def _points(views: Views, i: int, place) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[no-untyped-def]
-    """Return all points (N, 3) of the object in view i, its frame, and their intensities (N,)."""
+def _points(views: Views, i: int, place: Placement) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """Return all points (N, 3) of the object in view i, its frame, and their contrasts (N,) and those of the image."""
     depth = views.depths_m[i]
     v, u = np.nonzero(depth)
     points = frames.apply(place.T_object_world, unprojected(u, v, depth[v, u], views.intrinsics[i]))
@@ -79,16 +85,28 @@ def _points(views: Views, i: int, place) -> tuple[np.ndarray, np.ndarray]:  # ty
         & (points[:, 2] < place.bounds_m[1, 2])
         & place.covers(points[:, 0], points[:, 1])
     )
-    intensity = views.colours[i][v, u][own] if views.colours else np.zeros(int(own.sum()))
-    return points[own], intensity
+    if not views.colours:
+        return points[own], np.zeros(int(own.sum())), None
+    shown = np.zeros(depth.shape, bool)
+    shown[v[own], u[own]] = True
+    shade_px = SHADE_M * views.intrinsics[i, 0, 0] / float(np.median(depth[shown])) if own.any() else 1.0
+    contrasts = _contrasts(views.colours[i], shown, shade_px)
+    return points[own], contrasts[v[own], u[own]], contrasts
 
 
-def _even(points: np.ndarray, intensity: np.ndarray, eye: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return evenly spaced points, their normals towards the camera, intensities; without edges where there is neither."""
-    import open3d as o3d
+def _contrasts(intensity: np.ndarray, shown: np.ndarray, shade_px: float) -> np.ndarray:
+    """Return by how much (H, W) the pixels that are shown (H, W) are lighter than their neighbourhood; NaN elsewhere."""
+    weight = ndimage.gaussian_filter(shown.astype(float), shade_px)
+    mean = ndimage.gaussian_filter(np.where(shown, intensity, 0.0), shade_px) / np.maximum(weight, 1e-12)
+    return np.where(shown, intensity - mean, np.nan)
+
+
+def _even(points: np.ndarray, contrast: np.ndarray, eye: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return evenly spaced points, their normals towards the camera, contrasts; without edges where there is neither."""
+    from pipeline.geometry.open3d_core import open3d as o3d
 
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
-    cloud.colors = o3d.utility.Vector3dVector(np.repeat(intensity[:, None], 3, axis=1))
+    cloud.colors = o3d.utility.Vector3dVector(np.repeat(contrast[:, None], 3, axis=1))
     cloud = cloud.voxel_down_sample(VOXEL_M)
     cloud, _ = cloud.remove_statistical_outlier(12, 2.0)
     cloud.estimate_normals(o3d.geometry.KDTreeSearchParamRadius(NORMAL_RADIUS_M))

@@ -30,15 +30,17 @@ def signed_distances(lowest, voxel, columns, near, plane, view, projection, trun
     """
     nx, ny, nz = near.shape
     value, weight = np.zeros((nx, ny, nz), np.float32), np.zeros((nx, ny, nz), np.float32)
-    seen = np.zeros((len(view), 5))
+    seen, column = np.zeros((len(view), 5)), np.zeros((len(view), 3))
     for ix in range(nx):
         for iy in range(ny):
             if not columns[ix, iy]:
                 continue
+            x, y = (lowest[0] + ix) * voxel, (lowest[1] + iy) * voxel
+            column[:] = projection[:, :, 0] * x + projection[:, :, 1] * y + projection[:, :, 3]
             for iz in range(nz):
-                x, y, z = (lowest[0] + ix) * voxel, (lowest[1] + iy) * voxel, (lowest[2] + iz) * voxel
+                z = (lowest[2] + iz) * voxel
                 enough = len(view) if near[ix, iy, iz] else LEAST_FREE
-                count, free = _observed(x, y, z, plane, view, projection, truncation, enough, seen)
+                count, free = _observed(x, y, z, column, plane, view, projection, truncation, enough, seen)
                 if count + free > 0:
                     distance = _nearest_side(seen[:count], free * FREE_WORTH, truncation)
                     value[ix, iy, iz], weight[ix, iy, iz] = distance / truncation, count + free
@@ -49,23 +51,31 @@ def signed_distances(lowest, voxel, columns, near, plane, view, projection, trun
 def _pixel(x, y, z, k, view, projection):  # type: ignore[no-untyped-def]
     """Return which row of the planes the point falls on in view k; -1: none."""
     P = projection[k]
-    w = P[2, 0] * x + P[2, 1] * y + P[2, 2] * z + P[2, 3]
+    a = P[0, 0] * x + P[0, 1] * y + P[0, 2] * z + P[0, 3]
+    b = P[1, 0] * x + P[1, 1] * y + P[1, 2] * z + P[1, 3]
+    return _row(a, b, P[2, 0] * x + P[2, 1] * y + P[2, 2] * z + P[2, 3], k, view)
+
+
+@numba.njit(cache=True)
+def _row(a, b, w, k, view):  # type: ignore[no-untyped-def]
+    """Return which row of the planes the homogeneous pixel (a, b, w) is in view k; -1: none."""
     if w <= 0:
         return -1
-    u = int(np.floor((P[0, 0] * x + P[0, 1] * y + P[0, 2] * z + P[0, 3]) / w + 0.5))
-    v = int(np.floor((P[1, 0] * x + P[1, 1] * y + P[1, 2] * z + P[1, 3]) / w + 0.5))
+    inverse = 1.0 / w
+    u, v = int(np.floor(a * inverse + 0.5)), int(np.floor(b * inverse + 0.5))
     if u < 0 or v < 0 or u >= view[k, 1] or v >= view[k, 2]:
         return -1
     return view[k, 0] + v * view[k, 1] + u
 
 
 @numba.njit(cache=True)
-def _observed(x, y, z, plane, view, projection, truncation, enough, seen):  # type: ignore[no-untyped-def]
+def _observed(x, y, z, column, plane, view, projection, truncation, enough, seen):  # type: ignore[no-untyped-def]
     """Fill `seen` with distance, weight and normal of the planes within the truncation; return their number and that of views
-    that see past."""
+    that see past. column (V, 3): the part of the projections that is the same for all z."""
     count, free = 0, 0
     for k in range(len(view)):
-        row = _pixel(x, y, z, k, view, projection)
+        a, b = column[k, 0] + projection[k, 0, 2] * z, column[k, 1] + projection[k, 1, 2] * z
+        row = _row(a, b, column[k, 2] + projection[k, 2, 2] * z, k, view)
         if row < 0 or plane[row, 4] <= 0:
             continue
         distance = plane[row, 0] * x + plane[row, 1] * y + plane[row, 2] * z - plane[row, 3]

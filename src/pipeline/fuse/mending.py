@@ -45,6 +45,11 @@ def mended(
             f"{file}: expected a wall with two sides, found a surface without thickness ({sheet:.0%} of it can be seen from "
             "both sides); give it thickness, or write `wall_mm:` into scan.yaml beside it"
         )
+    if wall_m is not None and sheet <= MOST_SHEET:
+        raise PipelineError(
+            f"{file}: expected a surface without thickness, as scan.yaml gives `wall_mm`, found a wall with two sides "
+            f"({sheet:.0%} of it can be seen from both sides); remove `wall_mm`"
+        )
     if sheet > MOST_SHEET:
         return wrapped(*arrays(mesh), wall_m).surface(), facts | {"remeshed": True, "thickened_m": wall_m}
     found = holes(mesh)

@@ -10,6 +10,7 @@ from pipeline.errors import PipelineError
 UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 UPS = ("x", "y", "z", "-x", "-y", "-z")
 KEYS = ("units", "depth_scale", "up", "on_table", "wall_mm", "turntable_deg", "notes")
+_FIELDS = {"units": "unit_m", "wall_mm": "wall_m"}  # of the keys that are named otherwise in `Options`
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,13 @@ class DroppedMesh:
 
     path: Path
     options: Options
+
+
+def refuse(options: Options, path: Path, scan: str, **reasons: str) -> None:
+    """Refuse keys of the scan.yaml at `path` that have no effect on such a scan; each with the reason why."""
+    for key, reason in reasons.items():
+        if getattr(options, _FIELDS.get(key, key)) is not None:
+            raise PipelineError(f"{path}: expected no `{key}` for {scan}, as {reason}; found it; remove it")
 
 
 def options(path: Path) -> Options:

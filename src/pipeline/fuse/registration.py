@@ -4,17 +4,16 @@ Turns are searched all round, so that neither an order of the views nor an overl
 what a view measures (places, normals, colours: nearest neighbours in all three) and what it looks through.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import minimum_filter
 from scipy.spatial import cKDTree
 
 from pipeline.command import progress
 from pipeline.errors import PipelineError
 from pipeline.fuse import placement, tsdf
-from pipeline.fuse.agreement import projected
+from pipeline.fuse.evidence import Evidence, nearest
 from pipeline.fuse.levelled import NORMAL_M, Levelled, axis_of, level
 from pipeline.fuse.raw import Views
 from pipeline.geometry import frames
@@ -33,7 +32,7 @@ GOLDEN = 0.381966  # of a whole turn
 ALONG = 0.1  # weight of distances along the surface
 ALIKE = 0.5  # cosine between normals of points that are the same
 ROBUST_M = 0.002  # residuals beyond count less
-THROUGH_M = 0.008  # a view looks through what is this far in front of what it measures
+TURNS_BY_COLOUR_RAD = (0.04, 0.02, 0.01)
 COARSE, FINE, MODEL, MOST_MODEL = 300, 1200, 1500, 15_000  # points
 ITERATIONS, SWEEPS = 12, 10
 LEAST_VIEWS = 6
@@ -97,7 +96,7 @@ def _placed(stood: list[Levelled], views: Views, rng: np.random.Generator) -> tu
     And how well turns are told apart: the share of points that the worst turn contradicts, in the middle of the views.
     """
     cameras = list(zip(views.depths_m, views.intrinsics, strict=True))
-    near, sure = ([_nearest(depth, K, edge) for depth, K in cameras] for edge in (EDGE_M, SURE_EDGE_M))
+    near, sure = ([nearest(depth, K, edge) for depth, K in cameras] for edge in (EDGE_M, SURE_EDGE_M))
     poses, told = [np.eye(4)], np.zeros(len(stood))
     turns = [*range(1, len(stood)), *range(1, len(stood))]
     for k in progress(turns, len(turns), f"finding poses of {len(stood)} views: fits"):
@@ -107,7 +106,11 @@ def _placed(stood: list[Levelled], views: Views, rng: np.random.Generator) -> tu
         share = max(COARSE, MOST_MODEL // len(others))
         model = np.concatenate([_some(stood[j], share, rng).features(poses[j]) for j in others])
         known = _known_turn(stood, poses, k, views.options.turntable_deg)
-        evidence, certain = (Evidence(images, views.intrinsics, witnesses) for images in (near, sure))
+        contrasts = {view.number: view.contrasts for view in stood}
+        evidence, certain = (
+            Evidence(views.depths_m, images, views.intrinsics, witnesses, contrasts)
+            for images in (near, sure)
+        )
         pose, told[k] = _best(stood[k], known, model, evidence, certain, rng)
         poses = [*poses[:k], pose, *poses[k + 1 :]]
     return poses, float(np.median(told[1:]))
@@ -128,39 +131,6 @@ def _known_turn(
             turned = angles_deg[stood[k].number] - angles_deg[stood[j].number]
             return float(np.arctan2(poses[j][1, 0], poses[j][0, 0]) - np.radians(turned))
     return None
-
-
-def _nearest(depth_m: np.ndarray, K: np.ndarray, edge_m: float) -> np.ndarray:
-    """Return the least depth within `edge_m` of each pixel (H, W): edges are not that sure."""
-    known = depth_m[depth_m > 0]
-    pixels = 1 + 2 * round(edge_m * K[0, 0] / float(np.median(known))) if len(known) else 1
-    least = minimum_filter(np.where(depth_m > 0, depth_m, np.inf), pixels)
-    return np.where(np.isfinite(least), least, 0.0)
-
-
-@dataclass(frozen=True)
-class Evidence:
-    """Nearest depths around each pixel (H, W), cameras, and some that are placed already: number and T_camera_world."""
-
-    nearest_m: list[np.ndarray]
-    intrinsics: np.ndarray
-    witnesses: list[tuple[int, np.ndarray]]
-
-    def against(self, view: Levelled, T: np.ndarray, probe: np.ndarray) -> float:
-        """Return the share of the model's points that the view looks through, and of the view's that others look through."""
-        T_camera_world = frames.inverse(T @ view.T_level_camera)
-        own = self._through(view.number, T_camera_world, probe)
-        features = view.features(T)
-        others = [self._through(number, T_camera, features) for number, T_camera in self.witnesses]
-        return own + float(np.mean(others))
-
-    def _through(self, number: int, T_camera_world: np.ndarray, features: np.ndarray) -> float:
-        """Return the share of points that face the camera, and that it looks through."""
-        points = frames.apply(T_camera_world, features[:, :3])
-        facing = np.einsum("nc,nc->n", points, frames.rotate(T_camera_world, features[:, 3:6])) < 0
-        measured, expected = projected(points, self.intrinsics[number], self.nearest_m[number])
-        asked = facing & (measured > 0)
-        return float(np.mean(asked & (measured - expected > THROUGH_M)))
 
 
 def _best(
@@ -190,7 +160,7 @@ def _best(
 def _some(view: Levelled, n: int, rng: np.random.Generator) -> Levelled:
     index = rng.choice(len(view.points_m), size=min(n, len(view.points_m)), replace=False)
     return replace(
-        view, points_m=view.points_m[index], normals=view.normals[index], intensity=view.intensity[index]
+        view, points_m=view.points_m[index], normals=view.normals[index], contrast=view.contrast[index]
     )
 
 
@@ -217,6 +187,16 @@ def _icp(view: Levelled, T: np.ndarray, tree: cKDTree, iterations: int) -> np.nd
         T = step @ T
         if np.abs(step - np.eye(4)).max() < 1e-5:
             break
+    return T if view.contrasts is None else _turned_by_colour(view, T, tree)
+
+
+def _turned_by_colour(view: Levelled, T: np.ndarray, tree: cKDTree) -> np.ndarray:
+    """Return T turned about the view's axis to where its colours fit best: planes of a round object do not tell turns."""
+    cost = _misfit(view, T, tree)
+    for turn_rad in TURNS_BY_COLOUR_RAD:
+        for turned in (T @ _turn(turn_rad), T @ _turn(-turn_rad)):
+            if (other := _misfit(view, turned, tree)) < cost:
+                T, cost = turned, other
     return T
 
 

@@ -17,7 +17,7 @@ MOST_PLANES = 5
 NEAR_M = 0.6  # around what the cameras look at; the rest is background
 LEAST_ABOVE = 0.9  # of the cameras are above a table
 CURE = "check that poses are camera→world in metres and the depth's scale (scan.yaml: depth_scale)"
-_TRIALS, _COUNTED, _REFINED = 2000, 4000, 200_000
+_TRIALS, _COUNTED, _REFINED = 2000, 4000, 100_000
 _STRIDE = 3
 
 
@@ -46,10 +46,12 @@ class Placement:
 
     def covers(self, x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
         """Return whether (x, y) of the object frame are within the footprint."""
-        cell = np.floor((np.stack([x_m, y_m], -1) - self.bounds_m[0, :2]) / CELL_M).astype(int)
-        inside = ((cell >= 0) & (cell < self.footprint.shape)).all(axis=-1)
-        i, j = np.moveaxis(np.clip(cell, 0, np.array(self.footprint.shape) - 1), -1, 0)
-        return inside & self.footprint[i, j]
+        (low_x, low_y), (nx, ny) = self.bounds_m[0, :2], self.footprint.shape
+        inside = (x_m >= low_x) & (x_m < low_x + nx * CELL_M) & (y_m >= low_y) & (y_m < low_y + ny * CELL_M)
+        i = ((x_m[inside] - low_x) / CELL_M).astype(int)
+        j = ((y_m[inside] - low_y) / CELL_M).astype(int)
+        inside[inside] = self.footprint[np.minimum(i, nx - 1), np.minimum(j, ny - 1)]
+        return inside
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,7 @@ def planes(points: np.ndarray, eyes: np.ndarray, name: str, rng: np.random.Gener
         largest = max(largest, share)
         if share < LEAST_SHARE:
             break
-        plane = refined(left[rng.integers(len(left), size=min(len(left), _REFINED))], normal, offset, eyes)
+        plane = refined(left, normal, offset, eyes)
         left = left[np.abs(plane.height(left)) > 2 * INLIER_M]
         under = int(np.count_nonzero(plane.height(eyes) < 0))
         if under <= (1 - LEAST_ABOVE) * len(eyes):
@@ -142,6 +144,7 @@ def _ransac(points: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, f
 
 def refined(points: np.ndarray, normal: np.ndarray, offset: float, eyes: np.ndarray) -> Plane:
     """Return the least-squares plane of the points (N, 3) near a first one, upwards to the cameras (M, 3)."""
+    points = points[:: -(-len(points) // _REFINED) or 1]
     for _ in range(4):
         inliers = points[np.abs(points @ normal + offset) < INLIER_M]
         if len(inliers) < 3:

@@ -11,6 +11,7 @@ from pipeline.fuse.layouts import Views
 from pipeline.fuse.planes import Planes, planes
 from pipeline.fuse.refinement import refined
 from pipeline.fuse.table import Placement
+from pipeline.fuse.walls import parted
 
 BLOCK = 8
 # The table's own surface, fused, stays below this height: what is lower counts as table.
@@ -30,7 +31,7 @@ class Surface:
     """A closed surface, object frame: vertices_m (V, 3), triangles (F, 3) oriented outwards.
 
     seen (V,): by a camera, not closed by us. inner (V,): at the cavity, which is every place walled in on its level.
-    table_closed_m2: area of the cavity's floor that is the table.
+    table_closed_m2: area of the cavity's floor that is the table. thickened_share: of the outside, where the wall was too thin.
     """
 
     vertices_m: np.ndarray
@@ -38,6 +39,7 @@ class Surface:
     seen: np.ndarray
     inner: np.ndarray
     table_closed_m2: float = 0.0
+    thickened_share: float = 0.0
 
 
 def fuse(views: Views, placement: Placement, voxel_m: float, truncation_m: float, name: str) -> Surface:
@@ -69,7 +71,8 @@ def fuse(views: Views, placement: Placement, voxel_m: float, truncation_m: float
     vertices[base, 2] = 0.0
     inner = touches(vertices, ~base, walled_in, lowest, voxel_m)
     vertices, weight = refined(vertices, triangles, base, _excess_m(vertices[:, 2], voxel_m), seen_by)
-    return Surface(vertices, triangles, (weight > LEAST_WEIGHT) & ~base, inner, table_closed_m2)
+    vertices, thickened = parted(vertices, triangles, inner, ~inner & ~base)
+    return Surface(vertices, triangles, (weight > LEAST_WEIGHT) & ~base, inner, table_closed_m2, thickened)
 
 
 def _excess_m(heights_m: np.ndarray, voxel_m: float) -> np.ndarray:
@@ -128,7 +131,7 @@ def _marched(
     value: np.ndarray, lowest: np.ndarray, voxel_m: float, expected: str
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the surface where the values (nx, ny, nz) change their sign, by marching cubes in the blocks that need it."""
-    import open3d as o3d
+    from pipeline.geometry.open3d_core import open3d as o3d
 
     value = np.where(np.abs(value) < _LEAST_VALUE, np.copysign(_LEAST_VALUE, value), value).astype(np.float32)
     nx, ny, nz = (n // BLOCK for n in value.shape)

@@ -26,7 +26,7 @@ class Field:
 
     def surface(self) -> Mesh:
         """Return the closed mesh where the values change their sign, oriented outwards."""
-        import open3d as o3d
+        from pipeline.geometry.open3d_core import open3d as o3d
 
         least = 0.02 * self.cell_m  # keeps vertices apart from cells' centres, so that no triangle is empty
         value = np.where(np.abs(self.value_m) < least, np.copysign(least, self.value_m), self.value_m)

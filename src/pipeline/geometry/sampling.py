@@ -2,6 +2,7 @@
 
 import numba
 import numpy as np
+from scipy.sparse import coo_matrix
 from scipy.spatial import cKDTree
 
 _CANDIDATES = 5  # candidates a point kept, Yuksel 2015, section 4
@@ -13,8 +14,9 @@ def triangle_areas_and_normals(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return areas (F,) in m² and unit normals (F, 3) of triangles (F, 3); the normal of an empty triangle is zero."""
     a, b, c = np.moveaxis(vertices_m[triangles], 1, 0)
-    cross = np.cross(b - a, c - a)
-    double = np.linalg.norm(cross, axis=1)
+    (ux, uy, uz), (vx, vy, vz) = (b - a).T, (c - a).T
+    cross = np.stack([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx], axis=1)
+    double = np.sqrt(cross[:, 0] ** 2 + cross[:, 1] ** 2 + cross[:, 2] ** 2)
     return double / 2, cross / np.maximum(double, 1e-300)[:, None]
 
 
@@ -48,12 +50,12 @@ def even_points(
     pairs = cKDTree(points).query_pairs(2 * radius, output_type="ndarray")
     normals = normals[triangle]
     pairs = pairs[np.einsum("ij,ij->i", normals[pairs[:, 0]], normals[pairs[:, 1]]) > 0]
-    pairs = np.concatenate([pairs, pairs[:, ::-1]])
-    pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
     distance = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
     weight = (1 - np.minimum(distance / (2 * radius), 1)) ** _EXPONENT
-    start = np.searchsorted(pairs[:, 0], np.arange(len(points) + 1))
-    kept = _eliminate(start, pairs[:, 1].copy(), weight, n)
+    one_way = coo_matrix((weight, pairs.T), shape=(len(points), len(points))).tocsr()
+    both = (one_way + one_way.T).tocsr()
+    both.sort_indices()
+    kept = _eliminate(both.indptr.astype(np.int64), both.indices.astype(np.int64), both.data, n)
     return points[kept], triangle[kept]
 
 

@@ -7,7 +7,7 @@ class Surface:
     """A triangle mesh: vertices (V, 3), triangles (F, 3). Answers are for points of any shape (..., 3)."""
 
     def __init__(self, vertices_m: np.ndarray, triangles: np.ndarray) -> None:
-        import open3d as o3d
+        from pipeline.geometry.open3d_core import open3d as o3d
 
         self._vertices = np.asarray(vertices_m, float)[np.unique(triangles)]
         self._tensor = o3d.core.Tensor.from_numpy
@@ -58,6 +58,13 @@ class Surface:
 
     def _rays(self, origins: np.ndarray, directions: np.ndarray):
         return self._tensor(np.concatenate([origins, directions], axis=-1).astype(np.float32))
+
+
+def is_closed(triangles: np.ndarray) -> bool:
+    """Return whether every edge of the triangles (F, 3) belongs to two of them."""
+    edges = np.sort(np.concatenate([triangles[:, :2], triangles[:, 1:], triangles[:, ::2]]), axis=1)
+    _, count = np.unique(edges[:, 0] * (edges.max(initial=0) + 1) + edges[:, 1], return_counts=True)
+    return bool((count == 2).all())
 
 
 def subdivided(vertices_m: np.ndarray, triangles: np.ndarray, edge_m: float) -> tuple[np.ndarray, np.ndarray]:
