@@ -71,6 +71,7 @@ def _page(own: pd.DataFrame, names: list[str], errors: Mapping, mapping: str, wo
         drawn.set_fontsize(5.8)
         for place in drawn.get_celld().values():
             place.set_linewidth(0.3)
+            place.set_edgecolor("0.6")
     return figure
 
 
