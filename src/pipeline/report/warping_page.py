@@ -40,7 +40,7 @@ class Measure:
 
 
 MEASURES = {
-    "residual_mm": Measure("distance of pairs, mm", 1.0, 12.0, 1, bar=2.0, of="mean"),
+    "residual_mm": Measure("distance of pairs, mm", 1.0, 6.0, 1, bar=2.0, of="mean"),
     "share_without_candidate": Measure("points without a candidate, %", 100.0, 5.0, 1, bar=1.0),
     "wall_side_flips": Measure("walls crossed, %", 100.0, 60.0, 0, bar=0.0),
     "wall_side_flips_without_check": Measure("… if normals were not checked, %", 100.0, 60.0, 0),
@@ -48,12 +48,12 @@ MEASURES = {
     "rim_iou": Measure("rim: IoU", 1.0, 1.0, 2, bar=0.75, of="mean", higher=True),
     "handle_iou": Measure("handle: IoU", 1.0, 1.0, 2, bar=0.8, of="mean", higher=True),
     "balanced_accuracy": Measure("balanced accuracy", 1.0, 1.0, 2, bar=0.97, of="mean", higher=True),
-    "radius": Measure("radius: error, %", 100.0, 10.0, 1, bar=1.0),
-    "opening_mm": Measure("opening's centre: error, mm", 1.0, 10.0, 1, bar=1.0),
-    "height": Measure("height: error, %", 100.0, 10.0, 1, bar=1.0),
-    "hull_volume": Measure("hull volume: error, %", 100.0, 20.0, 1, bar=2.0),
-    "capacity": Measure("capacity: error, %", 100.0, 20.0, 1, bar=2.0),
-    "tilt_reference_deg": Measure("tilt reference: error, °", 1.0, 10.0, 1, bar=1.5),
+    "radius": Measure("radius: error, %", 100.0, 4.0, 1, bar=1.0),
+    "opening_mm": Measure("opening's centre: error, mm", 1.0, 6.0, 1, bar=1.0),
+    "height": Measure("height: error, %", 100.0, 2.0, 1, bar=1.0),
+    "hull_volume": Measure("hull volume: error, %", 100.0, 6.0, 1, bar=2.0),
+    "capacity": Measure("capacity: error, %", 100.0, 4.0, 1, bar=2.0),
+    "tilt_reference_deg": Measure("tilt reference: error, °", 1.0, 3.0, 1, bar=1.5),
 }
 COLUMNS = 5
 
@@ -105,7 +105,7 @@ def overview(found: Scores, source: str) -> "Figure":
         _legend(axes.flat[len(MEASURES)])
         figure.suptitle(
             f"Methods of warping the {source.replace('_', ' ')} onto {len(next(iter(found.values())))} targets, label mapping; "
-            "in brackets how many bars a method reaches",
+            "in brackets how many bars a method reaches. Beyond an axis' end: at the edge.",
             fontsize=9,
         )
     return figure
@@ -171,4 +171,9 @@ def matrices(found: Scores) -> "Figure":
             axis.set_title(measure.words, fontsize=8)
         for axis in axes.flat[len(MEASURES) :]:
             axis.set_axis_off()
+        for axis in axes.flat[len(MEASURES) - COLUMNS : len(MEASURES)]:
+            axis.tick_params(labelbottom=True)
+        figure.suptitle(
+            "Every target by itself; the darker, the worse; –: there is no such number", fontsize=9
+        )
     return figure
