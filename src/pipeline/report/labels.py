@@ -18,7 +18,7 @@ PARTS = {"container": "#56B4E9", "rim": "#D55E00", "handle": "#009E73"}
 POINTS = 2500  # drawn of those that are seen
 ELEVATION_RAD, TURN_RAD = 0.5, 0.3
 HANDLE_SHARE = 0.02  # of the points, from where on there is a handle
-CELL_MM, BEHIND_MM = 3.0, 8.0  # what is this far behind another point of its cell is not seen
+CELL_SPACINGS, BEHIND_MM = 2.0, 8.0  # what is this far behind another point of its cell is not seen
 MARGIN_MM, BAR_MM = 4.0, 50.0
 INCHES_A_MM = 0.0085
 
@@ -104,7 +104,8 @@ def _seen(table: "pd.DataFrame", axes: np.ndarray, middle_m: np.ndarray) -> tupl
     colours = np.full(len(table), "#FFFFFF")
     for part, colour in PARTS.items():
         colours[table[part].to_numpy(bool)] = colour
-    cells = np.floor(np.column_stack([across, up]) / CELL_MM).astype(int)
+    cell_mm = CELL_SPACINGS * 1e3 * np.sqrt(np.median(table["area_m2"]))
+    cells = np.floor(np.column_stack([across, up]) / cell_mm).astype(int)
     _, cell = np.unique(cells, axis=0, return_inverse=True)
     front = np.full(cell.max() + 1, -np.inf)
     np.maximum.at(front, cell, near)
