@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from pipeline.artefacts import write_table
+from pipeline.report.sources import ERRORS
 from pipeline.report.spreads import QUANTITIES, draw_spreads, spread_numbers, spreads
 from pipeline.schemas import TABLES
 
@@ -34,7 +35,7 @@ def processed(tmp_path):
 
 
 def found(processed) -> dict:
-    errors = {key: np.array([[0.01, 0.02], [0.5, 0.5]]) for key in QUANTITIES}
+    errors = {key: np.array([[0.01, 0.02], [0.5, 0.5]]) for key in ERRORS}
     return spreads(processed, "cup", NAMES, ["near_k1", "near_k5"], errors)
 
 

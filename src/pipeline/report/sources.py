@@ -21,6 +21,9 @@ PANELS = {
     "rim_missed": ("rim: 1 − IoU, %", 100.0, 50.0, 0),
 }
 
+# What is worked out: that, and what the spreads are set beside.
+ERRORS = (*PANELS, "opening_mm")
+
 
 def main() -> None:
     """Read the parameters and labels by all sources and by several k; write the pages and their numbers."""
@@ -59,7 +62,7 @@ def matrices(processed: Path, names: list[str]) -> "dict[str, np.ndarray]":
 
     from pipeline.report.accuracy import label_scores, parameter_errors, read_truth, true_parts
 
-    found = {key: np.zeros((len(names), len(names))) for key in PANELS}
+    found = {key: np.zeros((len(names), len(names))) for key in ERRORS}
     for column, target in enumerate(names):
         truth = read_truth(processed, target)
         parts = true_parts(read_table(processed / "fuse" / target / "cloud.parquet", "cloud"), truth)
@@ -95,8 +98,8 @@ def draw(errors: "dict[str, np.ndarray]", names: list[str], source: str, adopted
 
     with plt.rc_context(RC):
         figure, axes = plt.subplots(2, 3, figsize=(11.0, 7.6), layout="constrained")
-        for axis, (key, matrix) in zip(axes.flat, errors.items(), strict=True):
-            _matrix(axis, matrix, names, key)
+        for axis, key in zip(axes.flat, PANELS, strict=True):
+            _matrix(axis, errors[key], names, key)
         for axis in axes[:, 0]:
             axis.set_ylabel("source")
         for axis in axes[1]:
