@@ -9,7 +9,7 @@ from parametrise.clouds import cloud
 from pipeline.artefacts import read_table, write_table
 from pipeline.errors import PipelineError
 from pipeline.geometry.cavity import cavity, pour_axis, retained_volume_m3
-from pipeline.parametrise.cloud import PIECES
+from pipeline.parametrise.cloud import PIECES, evened
 from pipeline.parametrise.inside import GRID_DEG
 from pipeline.parametrise.library import parameter
 from pipeline.parametrise.parameters import INGREDIENTS, PARAMETERS, evaluate, numbers
@@ -155,3 +155,10 @@ def test_a_truncated_table_is_refused_by_file(tmp_path):
     path.write_bytes(path.read_bytes()[:1000])
     with pytest.raises(PipelineError, match=r"labels\.parquet: expected a Parquet table"):
         read_table(path, "labels")
+
+
+def test_points_that_many_were_mapped_to_stay_where_they_are():
+    body = cloud("short_cup")
+    points_m, normals = body.points_m[body.container], body.normals[body.container]
+    twice = np.repeat(np.arange(0, len(points_m), 40), 60)
+    np.testing.assert_allclose(evened(points_m[twice], normals[twice]), points_m[twice], atol=1e-4)

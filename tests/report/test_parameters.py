@@ -100,5 +100,5 @@ def test_the_table_has_value_uncertainty_and_the_known_error():
         place: cell.get_text().get_text() for place, cell in pages[0].axes[0].tables[0].get_celld().items()
     }
     assert cells[(1, -1)] == "radius, mm"
-    assert cells[(1, 0)] == f"{own['value'] * 1e3:.2f} ± {own['std'] * 1e3:.2f} (-1.2 %)"
-    assert cells[(2, -1)] == "retained 000°, ml"
+    assert cells[(1, 0)] == f"{own['value'] * 1e3:.2f} ± {own['std'] * 1e3:.2f} (−1.2 %)"
+    assert cells[(2, -1)] == "retained 0°, ml"

@@ -2,11 +2,16 @@
 
 import os
 
+import numpy as np
 import pytest
 import trimesh
 
 from pipeline.artefacts import read_json, read_table
+from pipeline.report.accuracy import read_truth
+from pipeline.report.warping import scores
+from pipeline.report.warping_page import MEASURES
 from pipeline.track.store import client
+from pipeline.warp.methods import METHODS
 
 OBJECTS = {"mug", "short_cup", "wide_bowl"}
 ASSEMBLED = {"assemble_parameters", "assemble_tilt_references"}
@@ -92,6 +97,8 @@ def test_one_core_gives_the_same_bytes_as_two(finished, unfinished):
         ("fuse.points", 7000, FUSED | LABELLED | WARPED | CONTAINED),
         ("label.ridge", 2.0, LABELLED | WARPED),
         ("warp.k", 2, WARPED),
+        # Shapes are learnt from warps by the default method, onto all but the target.
+        ("warp.method", "shape_space", WARPED | _each("warp_by", OBJECTS - {"mug"})),
         ("parametrise.hull_points", 3000, PARAMETRISED | UNCERTAIN),
         ("parametrise.redraws", 3, UNCERTAIN),
         ("simulate.seed", 40, SIMULATED),
@@ -153,6 +160,36 @@ def test_ablations_are_made_when_they_are_asked_for_and_reuse_what_their_key_doe
         "--volume cavity --margin none",
     ):
         assert any(changed in line for line in commands), changed
+
+
+def test_methods_of_warping_are_compared_when_it_is_asked_for(project):
+    targets = OBJECTS - {"mug"}
+    compared = _each("warp_by", targets) | _each("parametrise_by", targets)
+    assert project.planned("reports/warping.pdf") == compared | {"report_warping"}
+    told = project.call("-n", "-p", "reports/warping.pdf").stdout
+    warps = [line for line in told.splitlines() if "python -m pipeline.warp " in line]
+    assert len(warps) == len(METHODS) * len(targets)
+    learning = [line for line in warps if "--examples data" in line]
+    assert [("--method shape_space" in line) for line in learning] == [True] * len(targets)
+    # Shapes are learnt from the others, never from the target.
+    for line in learning:
+        called, learnt = line.split(" --examples ")
+        target = next(name for name in targets if f"_k1/{name}/warp.npz" in called)
+        assert f"{target}/" not in learnt.split(" > ")[0]
+
+
+def test_a_method_that_leaves_an_object_without_a_rim_is_compared_all_the_same(project):
+    """A mug that keeps its size reaches no rim of a wide bowl."""
+    path = "data/processed/parametrise/mug/by/rigid_k1/wide_bowl.parquet"
+    told = project.call(path, "--config", "track={enabled: false}")
+    assert told.returncode == 0, told.stdout
+    rows = read_table(project / path, "parameters").set_index("mapping")
+    assert np.isnan(rows.loc["label_mapping", ["radius_m", "capacity_m3"]].to_numpy(float)).all()
+    processed = project / "data/processed"
+    found = scores(processed, "mug", "wide_bowl", "rigid_k1", read_truth(processed, "wide_bowl"))
+    assert set(found) == set(MEASURES)
+    assert np.isnan(found["radius"])
+    assert found["wall_side_flips"] == 0.0 < found["fit_s"]
 
 
 def test_two_keys_that_swap_their_values_are_a_change(project):

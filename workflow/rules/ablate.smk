@@ -7,15 +7,13 @@
 import copy
 
 ABLATE = f"{PROCESSED}/ablate"
-# Not the rigid method: a mug that keeps its size puts no rim on a wide bowl, which then has no parameters.
-METHODS = schema["properties"]["warp"]["properties"].get("method", {}).get("enum", [])
-METHODS = [method for method in METHODS if method != "rigid"]
 # Variant: the key that it changes and its value there.
 VARIANTS = {
     "default": ("", None),
     **{f"k_{k}": ("warp.k", k) for k in (5, 20)},
     "paper_alignment": ("warp.refinements", 0),
-    **{f"method_{method}": ("warp.method", method) for method in METHODS},
+    # Not the rigid method: a mug that keeps its size puts no rim on a wide bowl, which then has no parameters.
+    **{f"method_{method}": ("warp.method", method) for method in METHODS if method != "rigid"},
     **{f"source_{name}": ("objects.source", name) for name in ("tall_cup", "jug", "wide_bowl")},
     "true_cavity": ("classify.volume", "cavity"),
     "quadratic_terms": ("classify.terms", "quadratic"),
@@ -92,18 +90,23 @@ rule ablate_labels:
         " > {log:q} 2>&1"
 
 
+def source_of(variant):
+    """Return the name of the variant's source."""
+    key, value = VARIANTS[variant]
+    return value if key == "objects.source" else SOURCE
+
+
 def labels_of_source(wildcards):
     """Return the labels of the variant's source."""
-    key, value = VARIANTS[wildcards.variant]
-    if key == "objects.source":
-        return rules.ablate_labels.output.labels.format(object=value)
-    return rules.label.output.labels.format(object=SOURCE)
+    labels = rules.label if source_of(wildcards.variant) == SOURCE else rules.ablate_labels
+    return labels.output.labels.format(object=source_of(wildcards.variant))
 
 
 use rule warp as ablate_warp with:
     input:
         source=labels_of_source,
         target=rules.label.output.labels,
+        examples=lambda w: examples(varied(w.variant)["warp"]["method"], source_of(w.variant), w.object),
     output:
         **{
             name: path.replace(f"{PROCESSED}/warp/{{source}}", f"{ABLATE}/{{variant}}/warp")

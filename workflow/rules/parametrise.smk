@@ -1,6 +1,7 @@
 # Needs both mappings of an object.
 # Makes parametrise/<source>/<object>.parquet and tilt_references/<object>.parquet; uncertainties/<object>.parquet, every listed
 #       parameter with its spread; then the tables of all objects, parameters.parquet, tilt_references.parquet, uncertainties.parquet.
+#       For comparisons the first two below parametrise/<source>/by/<method>_k<k>/.
 # How: one function a parameter, evaluated on the warped points, and on points drawn again from them for its uncertainty.
 
 
@@ -22,6 +23,26 @@ rule parametrise:
     shell:
         "python -m pipeline.parametrise --object {wildcards.object} --point-mapping {input.point:q} --label-mapping {input.label:q}"
         " --parameters {output.parameters:q} --tilt-references {output.tilt_references:q} {params.options} > {log:q} 2>&1"
+
+
+PARAMETRISE_BY = f"{PROCESSED}/parametrise/{{source}}/by/{{method}}_k{{k}}"
+
+
+use rule parametrise as parametrise_by with:
+    input:
+        point=rules.warp_by.output.point,
+        label=rules.warp_by.output.label,
+    output:
+        parameters=f"{PARAMETRISE_BY}/{{object}}.parquet",
+        tilt_references=f"{PARAMETRISE_BY}/tilt_references/{{object}}.parquet",
+    log:
+        "logs/parametrise/{source}/by/{method}_k{k}/{object}.log",
+    benchmark:
+        "benchmarks/parametrise/{source}/by/{method}_k{k}/{object}.tsv"
+    params:
+        # Rigidly warped, a mug leaves a wide bowl without a rim: the comparison says so.
+        options=options("parametrise", "hull_points") + " --allow-missing",
+        code=code("pipeline.parametrise"),
 
 
 rule uncertainties:

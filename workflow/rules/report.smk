@@ -4,6 +4,7 @@
 #       reports/parameters.pdf, every parameter on its object and against known values, and reports/parameters.json, volumes side by side;
 #       reports/scans/<object>.png, a page on each scan; reports/index.html, all of this on one page for a browser;
 #       when asked for, reports/sources.pdf and .json, every demonstration object as the source for every other;
+#       when asked for, reports/warping.pdf and .json, every method of warping on every demonstration object;
 #       reports/evaluation.pdf and .json, how sure the scores are and what that says of the paper's claims;
 #       when asked for, reports/ablations.pdf and .json, the scores with one key changed at a time;
 #       reports/promp.pdf (Fig. 4) with reports/promp.json, where there are demonstrations of a pour;
@@ -237,8 +238,22 @@ rule report_physics:
         " --other-trials {params.others} --page {output.page:q} --numbers {output.numbers:q} {params.options} > {log:q} 2>&1"
 
 
+# Neighbours of the label mapping over which parameters spread, beside the configured number.
+SPREAD_OVER_K = sorted({1, 5, 20, config["warp"]["k"]})
+
+
 rule report_sources:
     input:
+        by_k=expand(
+            rules.parametrise_by.output.parameters,
+            source=SOURCE,
+            method=config["warp"]["method"],
+            k=SPREAD_OVER_K,
+            object=FOUND.demonstration,
+        ),
+        uncertainties=expand(
+            rules.uncertainties.output.uncertainties, source=SOURCE, object=FOUND.demonstration
+        ),
         truth=expand(rules.scan.output.truth, object=FOUND.demonstration),
         fuse=expand(rules.fuse.output, object=FOUND.demonstration),
         warp=expand(rules.warp.output.label, source=FOUND.demonstration, object=FOUND.demonstration),
@@ -255,11 +270,48 @@ rule report_sources:
         processed=PROCESSED,
         source=SOURCE,
         objects=" ".join(FOUND.demonstration),
+        by_k=" ".join(f"{config['warp']['method']}_k{k}" for k in SPREAD_OVER_K),
         adopted=" ".join(name for name in FOUND.demonstration if annotation_of(name).startswith(PROCESSED)),
         code=code("pipeline.report.sources"),
     shell:
         "python -m pipeline.report.sources --processed {params.processed:q} --source {params.source} --objects {params.objects}"
-        " --adopted {params.adopted} --page {output.page:q} --numbers {output.numbers:q} > {log:q} 2>&1"
+        " --adopted {params.adopted} --by-k {params.by_k} --page {output.page:q} --numbers {output.numbers:q} > {log:q} 2>&1"
+
+
+rule report_warping:
+    input:
+        truth=expand(rules.scan.output.truth, object=FOUND.demonstration),
+        fuse=expand(rules.fuse.output, object=FOUND.demonstration),
+        warp=expand(
+            rules.warp_by.output,
+            source=SOURCE,
+            method=METHODS,
+            k=config["warp"]["k"],
+            object=[name for name in FOUND.demonstration if name != SOURCE],
+        ),
+        parametrise=expand(
+            rules.parametrise_by.output.parameters,
+            source=SOURCE,
+            method=METHODS,
+            k=config["warp"]["k"],
+            object=[name for name in FOUND.demonstration if name != SOURCE],
+        ),
+    output:
+        page=f"{REPORTS}/warping.pdf",
+        numbers=f"{REPORTS}/warping.json",
+    log:
+        "logs/report/warping.log",
+    threads: 1
+    params:
+        processed=PROCESSED,
+        source=SOURCE,
+        targets=" ".join(name for name in FOUND.demonstration if name != SOURCE),
+        methods=" ".join(METHODS),
+        k=options("warp", "k"),
+        code=code("pipeline.report.warping"),
+    shell:
+        "python -m pipeline.report.warping --processed {params.processed:q} --source {params.source} --targets {params.targets}"
+        " --methods {params.methods} {params.k} --page {output.page:q} --numbers {output.numbers:q} > {log:q} 2>&1"
 
 
 # The first pairs of the configuration are filmed.

@@ -6,6 +6,9 @@ from scipy.spatial import ConvexHull
 # 1/g, 1/g², 1/g³ with g⁴ = g + 1: the steps of the R3 sequence, Roberts 2018, "The unreasonable effectiveness of quasirandom
 # sequences", whose points leave no gaps.
 _STEPS = 1.2207440846057596 ** -np.arange(1.0, 4.0)
+# A hull of so many of a hull's corners is within it, and has most of its inside.
+_INNER_CORNERS = 200
+_LIPS = 16  # at a time
 
 
 def points_in_hull(points_m: np.ndarray, n: int) -> np.ndarray:
@@ -22,12 +25,21 @@ def points_inside(hull: ConvexHull, n: int) -> np.ndarray:
     low, extent = hull.min_bound, hull.max_bound - hull.min_bound
     count = int(np.ceil(n * np.prod(extent) / hull.volume))
     candidates = low + extent * ((0.5 + np.arange(1, count + 1)[:, None] * _STEPS) % 1.0)
+    corners = hull.points[hull.vertices]
+    inner = ConvexHull(corners[:: max(1, len(corners) // _INNER_CORNERS)])
+    inside = _within(candidates, inner)
+    inside[~inside] = _within(candidates[~inside], hull)
+    return candidates[inside]
+
+
+def _within(points_m: np.ndarray, hull: ConvexHull) -> np.ndarray:
+    """Return which of points (N, 3) are in a hull."""
     facets = np.unique(hull.equations.round(9), axis=0)
-    inside = np.ones(count, bool)
+    inside = np.ones(len(points_m), bool)
     for some in np.array_split(facets, max(1, len(facets) // 64)):
         rows = np.flatnonzero(inside)
-        inside[rows] = (candidates[rows] @ some[:, :3].T + some[:, 3] <= 0.0).all(axis=1)
-    return candidates[inside]
+        inside[rows] = (points_m[rows] @ some[:, :3].T + some[:, 3] <= 0.0).all(axis=1)
+    return inside
 
 
 def raising_tilt_rad(points_m: np.ndarray, lip_m: np.ndarray, opening_m: np.ndarray) -> np.ndarray:
@@ -49,3 +61,15 @@ def tilt_reference_rad(inside_m: np.ndarray, lip_m: np.ndarray, opening_m: np.nd
     A point rises above the lip at its own angle, once, so the tilt that raises half of them is the median.
     """
     return float(np.median(raising_tilt_rad(inside_m, lip_m, opening_m)))
+
+
+def tilt_references_rad(inside_m: np.ndarray, lips_m: np.ndarray, opening_m: np.ndarray) -> np.ndarray:
+    """Return `tilt_reference_rad` about each of several lips (L, 3), as (L,)."""
+    outward = lips_m[:, :2] - opening_m[:2]
+    outward = outward / np.linalg.norm(outward, axis=1, keepdims=True)
+    found = []
+    for rows in np.array_split(np.arange(len(lips_m)), -(-len(lips_m) // _LIPS)):
+        along = np.einsum("lc,lc->l", lips_m[rows, :2], outward[rows])
+        behind = along[:, None] - outward[rows] @ inside_m[:, :2].T
+        found.append(np.median(np.arctan2(lips_m[rows, 2:] - inside_m[:, 2], behind), axis=1))
+    return np.concatenate(found)

@@ -5,6 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
+BLOCK = 500  # points whose neighbourhoods are held at a time: more leave the processor's cache
+LEAF = 32  # points of a leaf of the tree, which for hundreds of neighbours may be large
+
 
 def neighbourhood_features(points_m: np.ndarray, neighbours: Sequence[int]) -> np.ndarray:
     """Return features (N, 4 × len(neighbours)) of points (N, 3) that sample a surface uniformly.
@@ -14,10 +17,13 @@ def neighbourhood_features(points_m: np.ndarray, neighbours: Sequence[int]) -> n
     furthest of them. On a uniform cloud of a fixed number of points, k points are a fixed share of the surface: the
     neighbourhoods grow with the object and the features are free of units.
     """
-    distance, index = cKDTree(points_m).query(points_m, k=max(neighbours))
-    around_m = points_m[index] - points_m[:, None]
-    columns = [_features(around_m[:, :k], distance[:, k - 1 : k]) for k in neighbours]
-    return np.hstack(columns)
+    tree, found = cKDTree(points_m, leafsize=LEAF), []
+    for some_m in np.array_split(points_m, -(-len(points_m) // BLOCK)):
+        distance, index = tree.query(some_m, k=max(neighbours))
+        around_m = points_m[index] - some_m[:, None]
+        columns = [_features(around_m[:, :k], distance[:, k - 1 : k]) for k in neighbours]
+        found.append(np.hstack(columns))
+    return np.concatenate(found)
 
 
 def _features(around_m: np.ndarray, radius_m: np.ndarray) -> np.ndarray:

@@ -1,16 +1,21 @@
 """Read the warped parameters of an object off its warped clouds."""
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pipeline import command
 from pipeline.artefacts import points, read_table, write_table
+from pipeline.errors import PipelineError
 
 # The paper's, and the capacity: what later stages use.
 PAPER = (
     *("opening_m", "lip_m", "radius_m", "volume_m3", "height_m", "tilt_reference_rad"),
     "capacity_m3",
 )
+ALONG_RIM = ("x_m", "y_m", "z_m", "tilt_reference_rad")
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def main() -> None:
@@ -20,12 +25,14 @@ def main() -> None:
     for option in ("--point-mapping", "--label-mapping", "--parameters", "--tilt-references"):
         parser.add_argument(option, type=Path, required=True)
     parser.add_argument("--hull-points", type=int, default=8000, help="points that fill the hull")
+    parser.add_argument(
+        "--allow-missing",
+        action="store_true",
+        help="where a mapping has no container or rim, write no numbers",
+    )
     options = parser.parse_args()
 
     import pandas as pd
-
-    from pipeline.parametrise import cloud
-    from pipeline.parametrise.parameters import evaluate, numbers
 
     mappings = {
         "point_mapping": read_table(options.point_mapping, "mapping"),
@@ -35,20 +42,37 @@ def main() -> None:
     rows, references = [], []
     for mapping, table in mappings.items():
         head = {"object": options.object, "mapping": mapping}
-        pieces = cloud.warped(table, name=options.object).pieces(options.hull_points)
-        values = evaluate([*PAPER, "tilt_references_rad"], pieces)
-        rows.append({**head, **numbers(PAPER, values)})
-        references.append(pd.DataFrame({**head, **_references(values)}))
+        try:
+            values, along_rim = _read_off(table, options.object, options.hull_points)
+        except PipelineError:
+            if not options.allow_missing:
+                raise
+            values, along_rim = _nothing()
+        rows.append({**head, **values})
+        references.append(pd.DataFrame({**along_rim, **head}))
     centre = dict(zip(("centre_x_m", "centre_y_m", "centre_z_m"), centre_m, strict=True))
     write_table(options.parameters, pd.DataFrame(rows).assign(**centre), "parameters")
     write_table(options.tilt_references, pd.concat(references), "tilt_references")
 
 
-def _references(values: dict[str, Any]) -> dict[str, Any]:
-    return {
-        **dict(zip(("x_m", "y_m", "z_m"), values["rim_m"].T, strict=True)),
-        "tilt_reference_rad": values["tilt_references_rad"],
-    }
+def _read_off(table: "pd.DataFrame", name: str, hull_points: int) -> tuple[dict[str, float], dict[str, Any]]:
+    """Return the parameters of a mapping, and the columns of the tilt references along its rim."""
+    from pipeline.parametrise import cloud
+    from pipeline.parametrise.parameters import evaluate, numbers
+
+    pieces = cloud.warped(table, name=name).pieces(hull_points)
+    values = evaluate([*PAPER, "tilt_references_rad"], pieces)
+    columns = dict(zip(ALONG_RIM, (*values["rim_m"].T, values["tilt_references_rad"]), strict=True))
+    return numbers(PAPER, values), columns
+
+
+def _nothing() -> tuple[dict[str, float], dict[str, Any]]:
+    import numpy as np
+
+    from pipeline.parametrise.parameters import known
+
+    columns = [column for found in known(PAPER) for column in found.columns]
+    return dict.fromkeys(columns, np.nan), dict.fromkeys(ALONG_RIM, np.zeros(0))
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ PIECES = (
     *("rim_m", "hull_points"),
 )
 _LEAST = 20
-_NEIGHBOURS = 24
+_NEIGHBOURS, _LEAST_REACH_M = 24, 1e-6
 _AGREE = 0.7  # cosine between normals of the same side of a wall, at least
 
 
@@ -82,7 +82,8 @@ def evened(points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
     from scipy.spatial import cKDTree
 
     distance, near = cKDTree(points_m).query(points_m, k=min(2 * _NEIGHBOURS, len(points_m)))
-    reach = distance[:, [min(_NEIGHBOURS, len(points_m)) - 1]]
+    # Point mapping may take many points to one.
+    reach = np.maximum(distance[:, [min(_NEIGHBOURS, len(points_m)) - 1]], _LEAST_REACH_M)
     same_side = np.einsum("nkc,nc->nk", normals[near], normals) > _AGREE
     weight = np.where(same_side, np.exp(-2.0 * (distance / reach) ** 2), 0.0)
     across, along = _tangents(normals)

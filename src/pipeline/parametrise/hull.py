@@ -46,4 +46,4 @@ def tilt_reference_rad(hull_inside_m: np.ndarray, lip_m: np.ndarray, opening_m: 
 @ingredient
 def tilt_references_rad(hull_inside_m: np.ndarray, rim_m: np.ndarray, opening_m: np.ndarray) -> np.ndarray:
     """Tilt reference with the lip at each of the rim points, in their order (N,)."""
-    return np.array([hulls.tilt_reference_rad(hull_inside_m, lip, opening_m) for lip in rim_m])
+    return hulls.tilt_references_rad(hull_inside_m, rim_m, opening_m)

@@ -68,7 +68,7 @@ def drawings(objects: Sequence[Drawn]) -> "Figure":
 def _panel(axis: "Axes", drawn: Drawn) -> None:
     """Draw a cut and what is listed of the parameters that have a picture."""
     axis.set_title(drawn.name.replace("_", " "))
-    axis.set_aspect("equal")
+    axis.set_aspect("equal", adjustable="datalim")
     try:
         along, aside, height = drawn.in_plane_mm(drawn.points_m * 1e3)
     except KeyError:  # opening or lip are not listed: there is no plane to cut in

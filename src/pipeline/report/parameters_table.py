@@ -65,24 +65,28 @@ def _page(own: pd.DataFrame, names: list[str], errors: Mapping, mapping: str, wo
             cellLoc="right",
             loc="upper left",
             bbox=Bbox.unit(),
+            edges="horizontal",
         )
         drawn.auto_set_font_size(False)
         drawn.set_fontsize(5.8)
         for place in drawn.get_celld().values():
             place.set_linewidth(0.3)
+            place.set_edgecolor("0.6")
     return figure
 
 
 def _title(name: str, unit: str) -> str:
     shown = SHOWN.get(unit, (1.0, unit, 3))[1]
     stem = name if unit == "1" else name.removesuffix(f"_{unit}")
-    stem = stem.replace("_deg", "°").replace("_", " ")
+    stem = " ".join(
+        f"{int(word)}°" if word.isdigit() else word for word in stem.removesuffix("_deg").split("_")
+    )
     return f"{stem}, {shown}" if shown else stem
 
 
 def _cell(row: pd.Series, name: str, errors: Mapping[str, float], mapping: str) -> str:
     factor, _, decimals = SHOWN.get(row["unit"], (1.0, row["unit"], 3))
-    text = f"{row['value'] * factor:.{decimals}f} ± {row['std'] * factor:.{decimals}f}"
+    text = f"{row['value'] * factor:.{decimals}f} ± {row['std'] * factor:.{decimals}f}".replace("-", "−")
     key, unit = ERRORS.get(name, ("", ""))
     error = errors.get(f"parametrise.{mapping}.{key}")
     if error is None:
@@ -90,4 +94,4 @@ def _cell(row: pd.Series, name: str, errors: Mapping[str, float], mapping: str) 
     shown = (
         f"{100 * error:+.1f} %" if unit == "%" else f"{error:.1f} mm" if unit == "mm" else f"{error:+.1f}°"
     )
-    return f"{text} ({shown})"
+    return f"{text} ({shown})".replace("-", "−")

@@ -21,9 +21,12 @@ PANELS = {
     "rim_missed": ("rim: 1 − IoU, %", 100.0, 50.0, 0),
 }
 
+# What is worked out: that, and what the spreads are set beside.
+ERRORS = (*PANELS, "opening_mm")
+
 
 def main() -> None:
-    """Read the parameters and labels by all sources; write the page and its numbers."""
+    """Read the parameters and labels by all sources and by several k; write the pages and their numbers."""
     parser = command.parser(__doc__)
     parser.add_argument("--processed", type=Path, required=True, help="folder of the stages' artefacts")
     parser.add_argument("--objects", nargs="+", required=True, help="names of the demonstration objects")
@@ -31,15 +34,25 @@ def main() -> None:
         "--adopted", nargs="*", default=[], help="sources with the labels that the first gave them"
     )
     parser.add_argument("--source", required=True, help="name of the first source")
+    parser.add_argument(
+        "--by-k", nargs="+", required=True, help="<method>_k<k>: folders with that many neighbours"
+    )
     parser.add_argument("--page", type=Path, required=True)
     parser.add_argument("--numbers", type=Path, required=True)
     options = parser.parse_args()
 
+    from pipeline.report.spreads import draw_spreads, spread_numbers, spreads
     from pipeline.report.style import save
 
     errors = matrices(options.processed, options.objects)
-    save(draw(errors, options.objects, options.source, options.adopted), options.page)
-    write_json(options.numbers, numbers(errors, options.objects))
+    spread = spreads(options.processed, options.source, options.objects, options.by_k, errors)
+    ks = [by.rpartition("_k")[2] for by in options.by_k]
+    pages = [
+        draw(errors, options.objects, options.source, options.adopted),
+        draw_spreads(spread, options.source, ks),
+    ]
+    save(pages, options.page)
+    write_json(options.numbers, numbers(errors, options.objects) | spread_numbers(spread))
 
 
 def matrices(processed: Path, names: list[str]) -> "dict[str, np.ndarray]":
@@ -49,7 +62,7 @@ def matrices(processed: Path, names: list[str]) -> "dict[str, np.ndarray]":
 
     from pipeline.report.accuracy import label_scores, parameter_errors, read_truth, true_parts
 
-    found = {key: np.zeros((len(names), len(names))) for key in PANELS}
+    found = {key: np.zeros((len(names), len(names))) for key in ERRORS}
     for column, target in enumerate(names):
         truth = read_truth(processed, target)
         parts = true_parts(read_table(processed / "fuse" / target / "cloud.parquet", "cloud"), truth)
@@ -85,8 +98,8 @@ def draw(errors: "dict[str, np.ndarray]", names: list[str], source: str, adopted
 
     with plt.rc_context(RC):
         figure, axes = plt.subplots(2, 3, figsize=(11.0, 7.6), layout="constrained")
-        for axis, (key, matrix) in zip(axes.flat, errors.items(), strict=True):
-            _matrix(axis, matrix, names, key)
+        for axis, key in zip(axes.flat, PANELS, strict=True):
+            _matrix(axis, errors[key], names, key)
         for axis in axes[:, 0]:
             axis.set_ylabel("source")
         for axis in axes[1]:
@@ -105,28 +118,13 @@ def _matrix(axis: "Axes", matrix: "np.ndarray", names: list[str], key: str) -> N
     import numpy as np
     from matplotlib.patches import Rectangle
 
+    from pipeline.report.matrices import draw_matrix
+
     title, factor, end, decimals = PANELS[key]
     shown = matrix * factor
-    axis.pcolormesh(shown, cmap="cividis_r", vmin=0.0, vmax=end, edgecolors="white", linewidth=0.4)
-    for (row, column), value in np.ndenumerate(shown):
-        colour = "white" if value > 0.6 * end else "black"
-        axis.text(
-            column + 0.5,
-            row + 0.5,
-            f"{value:.{decimals}f}",
-            ha="center",
-            va="center",
-            fontsize=6,
-            color=colour,
-        )
+    draw_matrix(axis, shown, names, names, end=end, decimals=decimals)
     for i in range(len(names)):
         axis.add_patch(Rectangle((i, i), 1, 1, fill=False, edgecolor="black", lw=0.8))
-    words = [name.replace("_", " ") for name in names]
-    ticks = np.arange(len(names)) + 0.5
-    axis.set_xticks(ticks, words, rotation=50, ha="right", fontsize=6)
-    axis.set_yticks(ticks, words, fontsize=6)
-    axis.invert_yaxis()
-    axis.tick_params(length=0)
     axis.set_aspect("equal")
     mean = float(np.mean(shown[~np.eye(len(names), dtype=bool)]))
     axis.set_title(f"{title} (mean {mean:.{decimals + 1}f})", fontsize=8)

@@ -1,5 +1,6 @@
 """Warp the source to a target: its points onto the target's (point mapping), its labels onto the target (label mapping)."""
 
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 from zlib import crc32
@@ -31,21 +32,33 @@ def main() -> None:
     )
     parser.add_argument("--bends", type=int, default=1, help="bends of nearest_neighbour; the paper has none")
     parser.add_argument("--seed", type=int, default=3, help="of methods that draw points")
+    parser.add_argument(
+        "--examples",
+        type=Path,
+        nargs="*",
+        default=[],
+        help="warps of the source onto other objects that shape_space learns from",
+    )
+    parser.add_argument("--cpu", type=Path, help="processor time of the fit to write, JSON")
     options = parser.parse_args()
 
     from pipeline.warp import files
 
-    fitted = _fit(options)
+    fitted, cpu_s = _fit(options)
     mapped = {"point_mapping": fitted.map_cloud(options.k), "label_mapping": fitted.map_labels(options.k)}
     write_table(options.point_mapping, _table(mapped["point_mapping"]), "mapping")
     write_table(options.label_mapping, _table(mapped["label_mapping"]), "mapping")
     write_json(options.alignment, _alignment(fitted, mapped))
     files.save(options.warp, fitted)
+    if options.cpu:
+        write_json(options.cpu, {"fit_s": cpu_s})
 
 
-def _fit(options) -> "Warp":  # type: ignore[no-untyped-def]
+def _fit(options) -> "tuple[Warp, float]":  # type: ignore[no-untyped-def]
+    """Return the warp and the processor seconds that fitting took."""
     import numpy as np
 
+    from pipeline.warp import files
     from pipeline.warp.methods import METHODS
 
     if options.method not in METHODS:
@@ -53,9 +66,14 @@ def _fit(options) -> "Warp":  # type: ignore[no-untyped-def]
             f"--method: expected one of {' '.join(METHODS)}, found '{options.method}'; correct warp.method"
         )
     source, target = _cloud(options.source_labels), _cloud(options.target_labels)
-    own = {"nearest_neighbour": {"refinements": options.refinements, "bends": options.bends}}
+    own = {
+        "nearest_neighbour": {"refinements": options.refinements, "bends": options.bends},
+        "shape_space": {"examples": [files.load_example(path, source) for path in options.examples]},
+    }
     rng = np.random.default_rng([options.seed, crc32(target.name.encode())])
-    return METHODS[options.method](source, target, rng=rng, **own.get(options.method, {}))
+    start_s = time.process_time()
+    fitted = METHODS[options.method](source, target, rng=rng, **own.get(options.method, {}))
+    return fitted, time.process_time() - start_s
 
 
 def _cloud(path: Path) -> "Cloud":

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.warp import nearest_neighbour
-from pipeline.warp.clouds import Cloud, drawn
+from pipeline.warp.clouds import Cloud, drawn, subset
 from pipeline.warp.deformation import Chain, Kernels
 from pipeline.warp.warp import Warp
 
@@ -24,7 +24,7 @@ def fit(source: Cloud, target: Cloud, *, rng: np.random.Generator) -> Warp:
     from pycpd import DeformableRegistration
 
     warp = nearest_neighbour.coarse(source, target)
-    moving_m = drawn(warp.aligned, SOURCE_POINTS, rng).points_m
+    moving_m = drawn(subset(warp.aligned, warp.has_counterpart), SOURCE_POINTS, rng).points_m
     fixed_m = drawn(target, TARGET_POINTS, rng).points_m
     middle_m, size_m = fixed_m.mean(axis=0), float(fixed_m.std())
     drift = DeformableRegistration(

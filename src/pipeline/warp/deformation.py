@@ -96,13 +96,15 @@ class Kernels(Deformation):
 
     def jacobian(self, points_m: np.ndarray) -> np.ndarray:
         """Return the derivatives (N, 3, 3); the spline's kernel has none at a centre, where zero is taken."""
-        away = points_m[:, None] - self.centres_m
         if self.width_m:
             slope = -kernel(points_m, self.centres_m, self.width_m) / self.width_m**2
         else:
-            distance = np.linalg.norm(away, axis=2)
+            distance = -kernel(points_m, self.centres_m, 0.0)
             slope = -np.divide(1.0, distance, out=np.zeros_like(distance), where=distance > 0.0)
-        return self.affine + np.einsum("kc,nk,nkd->ncd", self.weights, slope, away, optimize=True)
+        # Σ wₖ slopeₖ (x − cₖ)ᵀ as two sums over the centres, which are products of matrices.
+        moments = (self.weights[:, :, None] * self.centres_m[:, None]).reshape(-1, 9)
+        towards = (slope @ self.weights)[:, :, None] * points_m[:, None]
+        return self.affine + towards - (slope @ moments).reshape(-1, 3, 3)
 
 
 def kernel(points_m: np.ndarray, centres_m: np.ndarray, width_m: float) -> np.ndarray:

@@ -1,5 +1,6 @@
 """Warps as files: what a method found, to be joined with the clouds that it was found for."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from pipeline.errors import PipelineError
 from pipeline.warp.alignment import PartFrame
 from pipeline.warp.clouds import Cloud
 from pipeline.warp.deformation import Chain, Deformation, Kernels, PartStretch
+from pipeline.warp.shape_space import example
 from pipeline.warp.stretch import Stretch
 from pipeline.warp.warp import Warp
 
@@ -37,23 +39,59 @@ def load(path: str | Path, source: Cloud, target: Cloud) -> Warp:
 
     Raises PipelineError where the file holds no warp, or one of clouds of another size.
     """
+    saved = _read(path)
+    expected = [len(source.points_m), len(target.points_m)]
+    if saved.points != expected:
+        raise PipelineError(
+            f"{path}: expected the warp of clouds of {expected[0]} and {expected[1]} points ({source.name}, {target.name}), "
+            f"found one of {saved.points[0]} and {saved.points[1]}; make it again with python -m pipeline.warp"
+        )
+    own = saved.source_frame, saved.target_frame, saved.deformation, saved.diagnostics
+    return Warp(saved.method, source, target, *own)
+
+
+def load_example(path: str | Path, source: Cloud) -> np.ndarray:
+    """Read where a source's points are on another object, as `shape_space` takes it (N, 3), from the warp onto that.
+
+    Raises PipelineError where the file holds no warp, or one of a source of another size.
+    """
+    saved = _read(path)
+    if saved.points[0] != len(source.points_m):
+        raise PipelineError(
+            f"{path}: expected a warp of {source.name} with its {len(source.points_m)} points, found one of a source of "
+            f"{saved.points[0]}; make it again with python -m pipeline.warp"
+        )
+    return example(source, saved.deformation, saved.source_frame, saved.target_frame)
+
+
+@dataclass(frozen=True)
+class _Saved:
+    """What a file says of a warp: all but the clouds, of which it knows how many points they had."""
+
+    method: str
+    points: list[int]
+    source_frame: PartFrame
+    target_frame: PartFrame
+    deformation: Deformation
+    diagnostics: dict[str, float]
+
+
+def _read(path: str | Path) -> _Saved:
     arrays = read_arrays(path)
     try:
-        found, expected = arrays["points"].tolist(), [len(source.points_m), len(target.points_m)]
-        source_frame, target_frame = _frame(arrays, "source"), _frame(arrays, "target")
         names, values = arrays["diagnostics_names"].tolist(), arrays["diagnostics"].tolist()
-        numbers = dict(zip(names, values, strict=True))
-        method, deformation = str(arrays["method"]), _deformation(arrays)
+        return _Saved(
+            str(arrays["method"]),
+            arrays["points"].tolist(),
+            _frame(arrays, "source"),
+            _frame(arrays, "target"),
+            _deformation(arrays),
+            dict(zip(names, values, strict=True)),
+        )
     except KeyError as error:
         raise PipelineError(
             f"{path}: expected a warp, found arrays without {error}; make it again with python -m pipeline.warp"
         ) from error
-    if found != expected:
-        raise PipelineError(
-            f"{path}: expected the warp of clouds of {expected[0]} and {expected[1]} points ({source.name}, {target.name}), "
-            f"found one of {found[0]} and {found[1]}; make it again with python -m pipeline.warp"
-        )
-    return Warp(method, source, target, source_frame, target_frame, deformation, numbers)
 
 
 def _frame(arrays: dict[str, np.ndarray], side: str) -> PartFrame:

@@ -54,7 +54,7 @@ def _refine(warp: Warp, refinements: int) -> Warp:
 
 def _between_planes_m(warp: Warp) -> float:
     """Return the mean distance of paired points along the target's normals: how far apart the surfaces are."""
-    thin, from_rows, to_rows = _pairs(warp)
+    thin, from_rows, to_rows = pairs(warp)
     apart_m = thin.target.points_m[to_rows] - thin.aligned.points_m[from_rows]
     return float(np.mean(np.abs(np.einsum("nc,nc->n", apart_m, thin.target.normals[to_rows]))))
 
@@ -84,7 +84,7 @@ def _extent(cloud: Cloud, frame: PartFrame) -> np.ndarray:
 
 def _refined(warp: Warp, stretch: Stretch) -> Stretch:
     """Return the stretch with the factors and offsets across the first axis that fit the warp's present pairs best."""
-    thin, from_rows, to_rows = _pairs(warp)
+    thin, from_rows, to_rows = pairs(warp)
     x = _in_part_frame(thin.source.points_m[from_rows], warp.source_frame)[:, 1:]
     y = _in_part_frame(thin.target.points_m[to_rows], warp.target_frame)[:, 1:]
     mean_x, mean_y = x.mean(axis=0), y.mean(axis=0)
@@ -94,19 +94,15 @@ def _refined(warp: Warp, stretch: Stretch) -> Stretch:
 
 def _bend(warp: Warp, stretched: Deformation) -> Kernels:
     """Return the spline that takes the stretched source to the target, by the warp's present pairs."""
-    thin, from_rows, to_rows = _pairs(warp)
+    thin, from_rows, to_rows = pairs(warp)
     here_m = stretched.map(thin.source.points_m)
     step = max(1, len(here_m) // BEND_CENTRES)
     return splines.fit(here_m[from_rows], thin.target.points_m[to_rows], here_m[::step], BEND_STIFFNESS)
 
 
-def _pairs(warp: Warp) -> tuple[Warp, np.ndarray, np.ndarray]:
-    """Return the warp of thinned clouds and the rows of its source and target that pair, both ways."""
-    thin = replace(
-        warp, source=thinned(warp.source, REFINEMENT_POINTS), target=thinned(warp.target, REFINEMENT_POINTS)
-    )
+def pairs(warp: Warp, points: int = REFINEMENT_POINTS) -> tuple[Warp, np.ndarray, np.ndarray]:
+    """Return the warp of clouds thinned to some points, and the rows of its source and target that pair, both ways."""
+    thin = replace(warp, source=thinned(warp.source, points), target=thinned(warp.target, points))
     there, back = point_pairs(thin, 1)[0][:, 0], label_pairs(thin, 1)[0][:, 0]
-    # A handle has no counterpart on a target without one.
-    usable = ~thin.source.parts[:, 2] | (warp.target_frame.handles > 0)
-    forth, home = np.flatnonzero((there >= 0) & usable), np.flatnonzero((back >= 0) & usable[back])
+    forth, home = np.flatnonzero((there >= 0) & thin.has_counterpart), np.flatnonzero(back >= 0)
     return thin, np.concatenate([forth, back[home]]), np.concatenate([there[forth], home])

@@ -7,10 +7,11 @@ import numpy as np
 
 from pipeline.geometry import frames
 from pipeline.warp.alignment import PartFrame
-from pipeline.warp.clouds import Cloud, Mapped
+from pipeline.warp.clouds import Cloud, Mapped, subset
 from pipeline.warp.deformation import Deformation
 from pipeline.warp.nearest import agreeing_neighbours, majority_of_neighbours, mean_of_neighbours
 
+LEAST_HANDLE = 0.02  # share of a target's points labelled handle that makes one likely; at most 0.002 are where there is none
 
 @dataclass(frozen=True)
 class Warp:
@@ -43,6 +44,15 @@ class Warp:
     def aligned(self) -> Cloud:
         """The source, deformed, in the target's object frame."""
         return self.deformation.carry(self.source)
+
+    @property
+    def has_counterpart(self) -> np.ndarray:
+        """Which of the source's points (N,) the target can have, too: all but a handle's, where there is none.
+
+        A handle that gives no direction (its labels say too little) is one all the same.
+        """
+        labelled = float(self.target.parts[:, 2].mean())
+        return ~self.source.parts[:, 2] | (self.target_frame.handles > 0) | (labelled >= LEAST_HANDLE)
 
     @property
     def source_index(self) -> np.ndarray:
@@ -122,6 +132,11 @@ def point_pairs(warp: Warp, k: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def label_pairs(warp: Warp, k: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return for each target point the k nearest source points with an agreeing normal: rows (M, k), distances (M, k)."""
-    aligned, target = warp.aligned, warp.target
-    return agreeing_neighbours(target.points_m, target.normals, aligned.points_m, aligned.normals, k)
+    """Return for each target point the k nearest source points with an agreeing normal: rows (M, k), distances (M, k).
+
+    Those without a counterpart are none: where the handle was, a wall without one would get its label.
+    """
+    target, rows = warp.target, np.flatnonzero(warp.has_counterpart)
+    near = subset(warp.aligned, rows)
+    index, distance = agreeing_neighbours(target.points_m, target.normals, near.points_m, near.normals, k)
+    return np.where(index >= 0, rows[index], -1), distance
