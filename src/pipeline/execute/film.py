@@ -110,9 +110,8 @@ def _pictures(options: argparse.Namespace, run: "pd.DataFrame", film: artefacts.
     with Cell(cup, second, T_world_second, T_cup_flange(cup, yaw_rad)) as cell:
         q, _ = kinematics.path(cell, T_world_held @ inverse(cell.T_flange_cup))
         studio = Studio(cell, cup, second, int(film["counts"].max()), float(film["radius_m"]))
-        for number, there in enumerate(
-            command.progress(balls, len(balls), f"filming {' into '.join(names)}")
-        ):
+        filming = f"filming {options.held[0]} into {options.target[0]}"
+        for number, there in enumerate(command.progress(balls, len(balls), filming)):
             cell.pose_arm(q[min(round(number * float(film["every_s"]) / PLAN_S), len(q) - 1)])
             images.append(studio.image(T_world_second, there))
     return images

@@ -13,6 +13,7 @@ from pipeline.warp.nearest import agreeing_neighbours, majority_of_neighbours, m
 
 LEAST_HANDLE = 0.02  # share of a target's points labelled handle that makes one likely; at most 0.002 are where there is none
 
+
 @dataclass(frozen=True)
 class Warp:
     """A source fitted to a target: their part frames, and the deformation that takes the one onto the other.
