@@ -25,6 +25,9 @@ MADE_BY = {
     "reports/physics.pdf": "report/test_physics.py::test_the_pages_are_the_same_bytes_for_the_same_rows",
     "reports/ablations.pdf": "report/test_evaluation.py::test_ablations_are_compared_with_the_default_replicate_by_replicate",
     "reports/sources.pdf": "report/test_sources.py::test_the_page_has_every_error_in_its_unit_and_names_who_was_annotated",
+    "reports/warping.pdf": "report/test_warping.py::test_the_matrices_have_every_target_and_a_dash_where_there_is_no_number",
+    "reports/watching.pdf": "report/test_watching.py::test_pages_are_drawn_of_any_number_of_pairs",
+    "films": "execute/test_film.py::test_a_film_has_its_frames_and_their_time",
     'reports/metrics.json --config "warp={method: cpd}"': "warp/test_methods.py::test_labels_arrive_and_no_wall_is_crossed",
 }
 
@@ -89,7 +92,11 @@ FORMS = (
         "benchmarks/test_liquid.py::test_the_benchmark_of_the_liquid_runs_and_its_pour_is_true",
     ),
     # Measurements of minutes, and what installs: no test runs these as they are printed.
-    Form(r"python benchmarks/(fusion|bullet|engines|primitives)\.py.*", looked_up, None),
+    Form(
+        r"python benchmarks/(fusion|bullet|engines|primitives|conditioned|watching|parameters)\.py.*",
+        looked_up,
+        None,
+    ),
     Form(r"python -m pipeline\.execute\.teacher", helped, None),
     Form(r"pip install .*", lambda text: text.replace("install", "install --help >/dev/null #"), None),
 )
