@@ -14,7 +14,6 @@ from pipeline.simulate.lookup import rim_at, wall_distance, wall_reach
 
 WARM = 0.8  # share of the last step's pressure that the next one starts from
 RELAXATION = 0.5  # of the Jacobi iterations
-TOLERATED = 0.007  # mean excess of density at which they end; DFSPH's own criterion (Bender & Koschier 2015)
 VISCOSITY = 0.8  # share of the neighbours' mean velocity taken over in a step (XSPH, Monaghan 1989)
 NEAREST = 0.4  # least distance of a particle from the wall, spacings
 BEYOND = 0.05  # a particle this many spacings beyond the wall after all corrections has leaked
@@ -187,12 +186,8 @@ def _push(p):
 
 @part
 def _correct(p, dt):
-    """Set `change` to what the impulses lack for no particle to be denser than 1 at the end of the step.
-
-    Return the sum of the densities above 1 that would be there without it.
-    """
+    """Set `change` to what the impulses lack for no particle to be denser than 1 at the end of the step."""
     n = p.count[0]
-    dense = np.float32(0.0)
     rate = p.spare_impulse
     for i in range(n):
         rate[i] = p.v[i, 0] * p.wall[i, 0] + p.v[i, 1] * p.wall[i, 1] + p.v[i, 2] * p.wall[i, 2]
@@ -210,12 +205,10 @@ def _correct(p, dt):
     for i in range(n):
         t = p.sums[i, 2] ** 2 + p.sums[i, 3] ** 2 + p.sums[i, 4] ** 2
         excess = p.sums[i, 0] + dt * rate[i] - np.float32(1.0)
-        dense += max(excess, np.float32(0.0))
         before = p.impulse[i]
         after = before + np.float32(RELAXATION) * excess / (dt * (t + p.sums[i, 1]) + np.float32(1e-6))
         p.impulse[i] = max(after, np.float32(0.0))
         p.change[i] = p.impulse[i] - before
-    return dense
 
 
 @part
@@ -307,10 +300,8 @@ def step(p, walls, dt, iterations, gravity, axis, pivot, speed, growth, damping)
     _sum(p, walls)
     _accelerate(p, dt, gravity, axis, pivot, speed, growth, damping)
     for _ in range(iterations):
-        dense = _correct(p, dt)
+        _correct(p, dt)
         _push(p)
-        if dense <= np.float32(TOLERATED) * p.count[0]:
-            break
     _move(p, dt, walls)
     well = True
     for g in range(p.count[1]):
