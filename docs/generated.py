@@ -73,8 +73,9 @@ def _keys(section: dict[str, Any], values: dict[str, Any], name: str) -> list[st
             f"| `{key}` | {_value(values[key])} | {_cell(inner['description'])} | {_allowed(inner)} |"
         )
     lines.append("")
-    for key in keys.keys() - plain.keys():
-        inner = keys[key]
+    for key, inner in keys.items():
+        if key in plain:
+            continue
         lines += [
             f"### {name}.{key}",
             "",

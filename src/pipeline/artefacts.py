@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -18,18 +17,6 @@ from pipeline.errors import PipelineError
 from pipeline.schemas import TABLES
 
 Mesh = tuple[np.ndarray, np.ndarray]
-# Not by trimesh: half of a second is what its import takes of every process.
-_PLY_HEADER = """ply
-format binary_little_endian 1.0
-element vertex {vertices}
-property float x
-property float y
-property float z
-element face {faces}
-property list uchar int vertex_indices
-end_header
-"""
-_PLY_FACE = np.dtype([("n", "u1"), ("corners", "<i4", 3)])
 Arrays = dict[str, np.ndarray]
 
 
@@ -99,44 +86,22 @@ def read_json(path: str | Path) -> Any:
 
 def write_mesh(path: str | Path, mesh: Mesh) -> None:
     """Write (vertices (V, 3) in metres, triangles (F, 3)) as binary PLY."""
+    import trimesh
+
     vertices, triangles = mesh
-    faces = np.zeros(len(triangles), _PLY_FACE)
-    faces["n"], faces["corners"] = 3, triangles
-    header = _PLY_HEADER.format(vertices=len(vertices), faces=len(faces)).encode("ascii")
     with replacing(path) as temporary:
-        temporary.write_bytes(header + np.ascontiguousarray(vertices, "<f4").tobytes() + faces.tobytes())
+        trimesh.Trimesh(vertices, triangles, process=False).export(temporary, file_type="ply")
 
 
 def read_mesh(path: str | Path) -> Mesh:
-    """Read a mesh, at its fastest when `write_mesh` wrote it: vertices (V, 3) in metres, triangles (F, 3)."""
-    try:
-        own = _own_mesh(Path(path).read_bytes())
-        if own is not None:
-            return own
-        import trimesh
+    """Read a mesh written by `write_mesh`: vertices (V, 3) in metres, triangles (F, 3)."""
+    import trimesh
 
+    try:
         mesh = trimesh.load_mesh(path, process=False)
     except (OSError, ValueError) as error:
         raise PipelineError(f"{path}: expected a mesh, but it cannot be read: {error}") from error
     return np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64)
-
-
-def _own_mesh(content: bytes) -> Mesh | None:
-    """Return the mesh in a file's content when it is laid out as `write_mesh` does."""
-    head, end, _ = content[:1000].partition(b"end_header\n")
-    counts = re.findall(rb"^element \w+ (\d+)$", head, re.MULTILINE)
-    if len(counts) != 2 or not head.startswith(b"ply\n"):
-        return None
-    vertices, faces = map(int, counts)
-    header = _PLY_HEADER.format(vertices=vertices, faces=faces).encode("ascii")
-    if re.sub(rb"comment .*\n", b"", head + end) != header:
-        return None
-    start, middle = len(head + end), len(head + end) + 12 * vertices
-    if len(content) != middle + _PLY_FACE.itemsize * faces:
-        raise ValueError("it has another length than its header says")
-    places = np.frombuffer(content, "<f4", 3 * vertices, start).reshape(-1, 3)
-    triangles = np.frombuffer(content, _PLY_FACE, faces, middle)["corners"]
-    return places.astype(float), triangles.astype(np.int64)
 
 
 def write_arrays(path: str | Path, arrays: Mapping[str, np.ndarray]) -> None:

@@ -49,10 +49,15 @@ def raising_tilt_rad(points_m: np.ndarray, lip_m: np.ndarray, opening_m: np.ndar
     direction from the opening's centre `opening_m` (3,) to the lip, lip side down. A point at depth d below the lip
     and distance u behind it is level with the lip at the angle atan2(d, u).
     """
-    outward = lip_m[:2] - opening_m[:2]
-    outward = outward / np.linalg.norm(outward)
-    behind = (lip_m[:2] - points_m[:, :2]) @ outward
-    return np.arctan2(lip_m[2] - points_m[:, 2], behind)
+    return _raising_tilts_rad(points_m, lip_m[None], opening_m)[0]
+
+
+def _raising_tilts_rad(points_m: np.ndarray, lips_m: np.ndarray, opening_m: np.ndarray) -> np.ndarray:
+    """Return the same about each of several lips (L, 3), as (L, N)."""
+    outward = lips_m[:, :2] - opening_m[:2]
+    outward = outward / np.linalg.norm(outward, axis=1, keepdims=True)
+    behind = np.einsum("lc,lc->l", lips_m[:, :2], outward)[:, None] - outward @ points_m[:, :2].T
+    return np.arctan2(lips_m[:, 2:] - points_m[:, 2], behind)
 
 
 def tilt_reference_rad(inside_m: np.ndarray, lip_m: np.ndarray, opening_m: np.ndarray) -> float:
@@ -65,11 +70,5 @@ def tilt_reference_rad(inside_m: np.ndarray, lip_m: np.ndarray, opening_m: np.nd
 
 def tilt_references_rad(inside_m: np.ndarray, lips_m: np.ndarray, opening_m: np.ndarray) -> np.ndarray:
     """Return `tilt_reference_rad` about each of several lips (L, 3), as (L,)."""
-    outward = lips_m[:, :2] - opening_m[:2]
-    outward = outward / np.linalg.norm(outward, axis=1, keepdims=True)
-    found = []
-    for rows in np.array_split(np.arange(len(lips_m)), -(-len(lips_m) // _LIPS)):
-        along = np.einsum("lc,lc->l", lips_m[rows, :2], outward[rows])
-        behind = along[:, None] - outward[rows] @ inside_m[:, :2].T
-        found.append(np.median(np.arctan2(lips_m[rows, 2:] - inside_m[:, 2], behind), axis=1))
-    return np.concatenate(found)
+    some = np.array_split(lips_m, -(-len(lips_m) // _LIPS))
+    return np.concatenate([np.median(_raising_tilts_rad(inside_m, lips, opening_m), axis=1) for lips in some])

@@ -147,7 +147,7 @@ def _cavity_seen_share(cloud: pd.DataFrame, inner_distance_mm: np.ndarray, truth
 
 def _normal_scores(cloud: pd.DataFrame, truth: Truth) -> dict[str, float]:
     """Return the shares of points whose normal is within 10° of the true surface's, and of seen ones that face the wrong side."""
-    import open3d as o3d
+    from pipeline.geometry.open3d_core import open3d as o3d
 
     scene = o3d.t.geometry.RaycastingScene(nthreads=1)
     vertices_m, triangles = truth.mesh

@@ -61,7 +61,7 @@ class Scene:
     """Meshes in the world that rays can hit."""
 
     def __init__(self, meshes_world: list[Mesh]) -> None:
-        import open3d as o3d
+        from pipeline.geometry.open3d_core import open3d as o3d
 
         self._scene = o3d.t.geometry.RaycastingScene()
         for vertices, triangles in meshes_world:
@@ -70,7 +70,7 @@ class Scene:
 
     def cast(self, T_world_camera: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return depth (H, W) in metres (inf where nothing is hit) and the angle of incidence (H, W) of every pixel."""
-        import open3d as o3d
+        from pipeline.geometry.open3d_core import open3d as o3d
 
         v, u = np.mgrid[:HEIGHT, :WIDTH].astype(float)
         K = intrinsics()

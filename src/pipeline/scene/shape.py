@@ -40,7 +40,7 @@ def surface(
 
 def thinned(mesh: Mesh, triangles: int = TRIANGLES, longest_m: float = LONGEST_EDGE_M) -> Mesh:
     """Return a mesh of about so many triangles, by quadrics, before its longest edges are split."""
-    import open3d as o3d
+    from pipeline.geometry.open3d_core import open3d as o3d
 
     full = o3d.geometry.TriangleMesh(
         o3d.utility.Vector3dVector(np.array(mesh[0])), o3d.utility.Vector3iVector(mesh[1].astype(np.int32))

@@ -168,7 +168,7 @@ def _extremes(points: np.ndarray) -> np.ndarray:
 
 def decimated(vertices_m: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return a mesh with few enough triangles for Bullet: neighbours merged first, which is fast, then quadric decimation."""
-    import open3d as o3d
+    from pipeline.geometry.open3d_core import open3d as o3d
 
     mesh = o3d.geometry.TriangleMesh(
         o3d.utility.Vector3dVector(vertices_m), o3d.utility.Vector3iVector(triangles)

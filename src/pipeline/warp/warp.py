@@ -11,8 +11,6 @@ from pipeline.warp.clouds import Cloud, Mapped, subset
 from pipeline.warp.deformation import Deformation
 from pipeline.warp.nearest import agreeing_neighbours, majority_of_neighbours, mean_of_neighbours
 
-LEAST_HANDLE = 0.02  # share of a target's points labelled handle that makes one likely; at most 0.002 are where there is none
-
 
 @dataclass(frozen=True)
 class Warp:
@@ -48,12 +46,8 @@ class Warp:
 
     @property
     def has_counterpart(self) -> np.ndarray:
-        """Which of the source's points (N,) the target can have, too: all but a handle's, where there is none.
-
-        A handle that gives no direction (its labels say too little) is one all the same.
-        """
-        labelled = float(self.target.parts[:, 2].mean())
-        return ~self.source.parts[:, 2] | (self.target_frame.handles > 0) | (labelled >= LEAST_HANDLE)
+        """Which of the source's points (N,) the target can have, too: all but a handle's, where no handle was found."""
+        return ~self.source.parts[:, 2] | (self.target_frame.handles > 0)
 
     @property
     def source_index(self) -> np.ndarray:
