@@ -12,7 +12,7 @@ from pipeline.simulate.particles import Particles, particles
 def at_rest(vessel: liquid.Vessel, n: int, seconds: float = 0.5) -> Particles:
     """Return n particles after some time without any damping."""
     p = particles(n, vessel.walls)
-    p.x[:n], p.count[0] = liquid.settle(vessel, n, 1), n
+    p.x[:n, :3], p.count[0] = liquid.settle(vessel, n, 1), n
     dt = rest.time_step_s(vessel)
     left, well = rest.rest(p, vessel.walls, dt, rest.ITERATIONS, int(seconds / dt), 0.0)
     assert well
@@ -111,5 +111,5 @@ def test_the_wall_is_as_solid_when_it_is_thin(cylinder: liquid.Vessel, thin: liq
 
 def test_a_particle_too_fast_stops_the_trial(cylinder: liquid.Vessel) -> None:
     p = particles(1, cylinder.walls)
-    p.x[0], p.v[0], p.count[0] = (0.0, 0.0, 0.05), (0.0, 0.0, 20.0), 1
+    p.x[0, :3], p.v[0, :3], p.count[0] = (0.0, 0.0, 0.05), (0.0, 0.0, 20.0), 1
     assert rest.rest(p, cylinder.walls, 0.005, 2, 1, 0.0) == (0, False)

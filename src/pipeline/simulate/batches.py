@@ -198,7 +198,7 @@ def _room(device: Device, vessel: Vessel, starts: Sequence[np.ndarray], capacity
     one, trials = particles(capacity, vessel.walls), len(starts)
     x, count = np.zeros((trials, *one.x.shape), one.x.dtype), np.zeros((trials, 2), one.count.dtype)
     for t, start in enumerate(starts):
-        x[t, : len(start)], count[t, 0] = start, len(start)
+        x[t, : len(start), :3], count[t, 0] = start, len(start)
     given = {"x": x, "count": count}
     return Particles(
         **{

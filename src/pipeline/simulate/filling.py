@@ -92,7 +92,7 @@ def filled(vessel: Vessel, n: int, capacity: int, seed: int, stream: int, dt: fl
     """Return a vessel's particles at rest, whether all went well and whether all stayed."""
     start = settle(vessel, n, (seed, stream))
     p = particles(capacity, vessel.walls)
-    p.x[: len(start)], p.count[0] = start, len(start)
+    p.x[: len(start), :3], p.count[0] = start, len(start)
     left, well = rest(p, vessel.walls, dt, ITERATIONS, int(HOLD_S / dt), SETTLE_DAMPING)
     return p, well, left == 0 and len(start) == n
 

@@ -14,6 +14,10 @@ from pipeline.simulate.lookup import rim_at, wall_distance, wall_reach
 
 WARM = 0.8  # share of the last step's pressure that the next one starts from
 RELAXATION = 0.5  # of the Jacobi iterations
+ENOUGH = 0.007  # mean excess of density at which the iterations end
+STEEPNESS = (
+    8.0  # of the kernel: squares of its gradients to its values, summed over neighbours, in its own units
+)
 VISCOSITY = 0.8  # share of the neighbours' mean velocity taken over in a step (XSPH, Monaghan 1989)
 NEAREST = 0.4  # least distance of a particle from the wall, spacings
 BEYOND = 0.05  # a particle this many spacings beyond the wall after all corrections has leaked
@@ -40,20 +44,19 @@ def _sort(p, walls):
     for i in range(n):
         k = p.bin_start[p.bin_of[i] + 1]
         p.bin_start[p.bin_of[i] + 1] = k + 1
-        for c in range(3):
+        for c in range(4):
             p.spare_x[k, c], p.spare_v[k, c] = p.x[i, c], p.v[i, c]
         p.spare_impulse[k] = p.impulse[i]
     for i in range(n):
-        for c in range(3):
+        for c in range(4):
             p.x[i, c], p.v[i, c] = p.spare_x[i, c], p.spare_v[i, c]
         p.impulse[i] = p.spare_impulse[i]
 
 
 @part
 def _find(p, walls):
-    """Find the pairs, each once, and the way `apart` from its second to its first; return whether they had room."""
-    x, other, first, bin_start = p.x, p.other, p.first, p.bin_start
-    apart_x, apart_y, apart_z = p.slope_x, p.slope_y, p.slope_z
+    """Find the pairs, each once, and the squares of their distances; return whether they had room."""
+    x, other, first, bin_start, square = p.x, p.other, p.first, p.bin_start, p.factor
     bx, by, bz = walls.bins[0], walls.bins[1], walls.bins[2]
     h = np.float32(SUPPORT) * walls.spacing
     hh = h * h
@@ -77,30 +80,29 @@ def _find(p, walls):
                     return False
                 for j in range(np.uint64(begin), np.uint64(end)):
                     dx, dy, dz = xi - x[j, 0], yi - x[j, 1], zi - x[j, 2]
-                    other[k], apart_x[k], apart_y[k], apart_z[k] = j, dx, dy, dz
-                    k += np.uint64(dx * dx + dy * dy + dz * dz < hh)
+                    rr = dx * dx + dy * dy + dz * dz
+                    other[k], square[k] = j, rr
+                    k += np.uint64(rr < hh)
     first[p.count[0]] = k
     return True
 
 
 @part
-def _slopes(p, walls):
-    """Turn each pair's way `apart` into the kernel's gradient there; set its weight. No branches, so that it runs in vectors."""
-    weight, slope_x, slope_y, slope_z = p.weight, p.slope_x, p.slope_y, p.slope_z
+def _weigh(p, walls):
+    """Turn each pair's squared distance into the kernel there and the factor from its way apart to the kernel's gradient."""
+    weight, factor = p.weight, p.factor
     h = np.float32(SUPPORT) * walls.spacing
     norm = _norm(walls, h)
     steep, per_h = norm / h, np.float32(1.0) / h
     none, half, one = np.float32(0.0), np.float32(0.5), np.float32(1.0)
     two, six, eight, many = np.float32(2.0), np.float32(6.0), np.float32(8.0), np.float32(24.0)
     for k in range(np.uint64(p.first[p.count[0]])):
-        dx, dy, dz = slope_x[k], slope_y[k], slope_z[k]
-        r = np.sqrt(dx * dx + dy * dy + dz * dz + np.float32(1e-14))
+        r = np.sqrt(factor[k] + np.float32(1e-14))
         q = r * per_h
         away, inner = max(one - q, none), max(half - q, none)
-        # The cubic spline as 2 (1 − q)³ − 8 (½ − q)³: no branch.
+        # The cubic spline as 2 (1 − q)³ − 8 (½ − q)³: no branch, so that it runs in vectors.
         weight[k] = norm * (two * away * away * away - eight * inner * inner * inner)
-        s = steep * (many * inner * inner - six * away * away) / r
-        slope_x[k], slope_y[k], slope_z[k] = s * dx, s * dy, s * dz
+        factor[k] = steep * (many * inner * inner - six * away * away) / r
 
 
 @part
@@ -111,104 +113,119 @@ def _norm(walls, h):
 
 @part
 def _sum(p, walls):
-    """Sum over the pairs into `sums`, from the wall's share on: density, its gradient and its square, change of velocity.
+    """Sum over the pairs into `sums`, from the wall's share on: the density's gradient, density, change of velocity.
 
     The change of velocity is viscosity's and that of the impulses in `change`, the last step's.
     """
     n = p.count[0]
     x, v, sums, wall, change = p.x, p.v, p.sums, p.wall, p.change
-    other, first, weight = p.other, p.first, p.weight
-    slope_x, slope_y, slope_z = p.slope_x, p.slope_y, p.slope_z
+    other, first, weight, factor, slope = p.other, p.first, p.weight, p.factor, p.slope
     reach, shape, origin, cell = walls.reach, walls.shape, walls.origin, walls.cell
     none, viscosity = np.float32(0.0), np.float32(VISCOSITY)
     own = _norm(walls, np.float32(SUPPORT) * walls.spacing)
     for i in range(n):
         share, gx, gy, gz = wall_reach(reach, shape, origin, cell, x[i, 0], x[i, 1], x[i, 2])
         c = change[i]
-        wall[i, 0], wall[i, 1], wall[i, 2] = gx, gy, gz
-        sums[i, 0], sums[i, 1], sums[i, 2], sums[i, 3], sums[i, 4] = share + own, none, gx, gy, gz
-        sums[i, 5], sums[i, 6], sums[i, 7] = -c * gx, -c * gy, -c * gz
+        wall[i, 0], wall[i, 1], wall[i, 2], wall[i, 3] = gx, gy, gz, share + own
+        sums[i, 0], sums[i, 1], sums[i, 2], sums[i, 3] = gx, gy, gz, share + own
+        sums[i, 4], sums[i, 5], sums[i, 6], sums[i, 7] = -c * gx, -c * gy, -c * gz, none
     for i in range(n):
-        ui, vi, wi, ci = v[i, 0], v[i, 1], v[i, 2], change[i]
-        den = sq = sx = sy = sz = du = dv = dw = none
+        xi, yi, zi, ei = x[i, 0], x[i, 1], x[i, 2], x[i, 3]
+        ui, vi, wi, oi = v[i, 0], v[i, 1], v[i, 2], v[i, 3]
+        ci = change[i]
+        sx = sy = sz = den = du = dv = dw = do = none
         for k in range(np.uint64(first[i]), np.uint64(first[i + 1])):
             j = other[k]
-            w, gx, gy, gz = weight[k], slope_x[k], slope_y[k], slope_z[k]
-            gg = gx * gx + gy * gy + gz * gz
+            s, w = factor[k], weight[k]
+            gx, gy, gz, ge = s * (xi - x[j, 0]), s * (yi - x[j, 1]), s * (zi - x[j, 2]), s * (ei - x[j, 3])
+            slope[k, 0], slope[k, 1], slope[k, 2], slope[k, 3] = gx, gy, gz, ge
             c, m = ci + change[j], viscosity * w
-            a, e, f = m * (v[j, 0] - ui) - c * gx, m * (v[j, 1] - vi) - c * gy, m * (v[j, 2] - wi) - c * gz
-            den += w
-            sq += gg
+            a, b = m * (v[j, 0] - ui) - c * gx, m * (v[j, 1] - vi) - c * gy
+            e, f = m * (v[j, 2] - wi) - c * gz, m * (v[j, 3] - oi) - c * ge
             sx += gx
             sy += gy
             sz += gz
+            den -= w
             du += a
-            dv += e
-            dw += f
-            sums[j, 0] += w
-            sums[j, 1] += gg
-            sums[j, 2] -= gx
-            sums[j, 3] -= gy
-            sums[j, 4] -= gz
-            sums[j, 5] -= a
+            dv += b
+            dw += e
+            do += f
+            sums[j, 0] -= gx
+            sums[j, 1] -= gy
+            sums[j, 2] -= gz
+            sums[j, 3] += w
+            sums[j, 4] -= a
+            sums[j, 5] -= b
             sums[j, 6] -= e
             sums[j, 7] -= f
-        sums[i, 0] += den
-        sums[i, 1] += sq
-        sums[i, 2] += sx
-        sums[i, 3] += sy
-        sums[i, 4] += sz
-        sums[i, 5] += du
-        sums[i, 6] += dv
-        sums[i, 7] += dw
+        sums[i, 0] += sx
+        sums[i, 1] += sy
+        sums[i, 2] += sz
+        sums[i, 3] -= den
+        sums[i, 4] += du
+        sums[i, 5] += dv
+        sums[i, 6] += dw
+        sums[i, 7] += do
 
 
 @part
 def _push(p):
     """Change the velocities by the impulses in `change`, pair by pair, and by the wall's answer."""
+    v, slope, change, other, first = p.v, p.slope, p.change, p.other, p.first
     for i in range(p.count[0]):
-        c = p.change[i]
-        ax, ay, az = c * p.wall[i, 0], c * p.wall[i, 1], c * p.wall[i, 2]
-        for k in range(np.uint64(p.first[i]), np.uint64(p.first[i + 1])):
-            j = p.other[k]
-            s = c + p.change[j]
-            gx, gy, gz = s * p.slope_x[k], s * p.slope_y[k], s * p.slope_z[k]
+        c = change[i]
+        ax, ay, az, ae = c * p.wall[i, 0], c * p.wall[i, 1], c * p.wall[i, 2], np.float32(0.0)
+        for k in range(np.uint64(first[i]), np.uint64(first[i + 1])):
+            j = other[k]
+            s = c + change[j]
+            gx, gy, gz, ge = s * slope[k, 0], s * slope[k, 1], s * slope[k, 2], s * slope[k, 3]
             ax += gx
             ay += gy
             az += gz
-            p.v[j, 0] += gx
-            p.v[j, 1] += gy
-            p.v[j, 2] += gz
-        p.v[i, 0] -= ax
-        p.v[i, 1] -= ay
-        p.v[i, 2] -= az
+            ae += ge
+            v[j, 0] += gx
+            v[j, 1] += gy
+            v[j, 2] += gz
+            v[j, 3] += ge
+        v[i, 0] -= ax
+        v[i, 1] -= ay
+        v[i, 2] -= az
+        v[i, 3] -= ae
 
 
 @part
-def _correct(p, dt):
-    """Set `change` to what the impulses lack for no particle to be denser than 1 at the end of the step."""
+def _correct(p, walls, dt):
+    """Set `change` to what the impulses lack for no particle to be denser than 1 at the end of the step.
+
+    Returns whether the mean excess of density was small before that. The diagonal of the equations is the sum of the squares of
+    the neighbours' gradients; it is taken from their density, as it decides how fast the solution is found, not which.
+    """
     n = p.count[0]
-    rate = p.spare_impulse
+    rate, v, slope, other, first, sums, wall = p.spare_impulse, p.v, p.slope, p.other, p.first, p.sums, p.wall
+    h = np.float32(SUPPORT) * walls.spacing
+    steep = np.float32(STEEPNESS) * _norm(walls, h) / (h * h)
     for i in range(n):
-        rate[i] = p.v[i, 0] * p.wall[i, 0] + p.v[i, 1] * p.wall[i, 1] + p.v[i, 2] * p.wall[i, 2]
+        rate[i] = v[i, 0] * wall[i, 0] + v[i, 1] * wall[i, 1] + v[i, 2] * wall[i, 2]
     for i in range(n):
-        u, v, w = p.v[i, 0], p.v[i, 1], p.v[i, 2]
+        a, b, c = v[i, 0], v[i, 1], v[i, 2]
         own = np.float32(0.0)
-        for k in range(np.uint64(p.first[i]), np.uint64(p.first[i + 1])):
-            j = p.other[k]
-            a = (u - p.v[j, 0]) * p.slope_x[k]
-            a += (v - p.v[j, 1]) * p.slope_y[k]
-            a += (w - p.v[j, 2]) * p.slope_z[k]
-            own += a
-            rate[j] += a
+        for k in range(np.uint64(first[i]), np.uint64(first[i + 1])):
+            j = other[k]
+            r = (a - v[j, 0]) * slope[k, 0] + (b - v[j, 1]) * slope[k, 1] + (c - v[j, 2]) * slope[k, 2]
+            own += r
+            rate[j] += r
         rate[i] += own
+    lack = np.float32(0.0)
     for i in range(n):
-        t = p.sums[i, 2] ** 2 + p.sums[i, 3] ** 2 + p.sums[i, 4] ** 2
-        excess = p.sums[i, 0] + dt * rate[i] - np.float32(1.0)
+        t = sums[i, 0] ** 2 + sums[i, 1] ** 2 + sums[i, 2] ** 2
+        squares = steep * (sums[i, 3] - wall[i, 3])
+        excess = sums[i, 3] + dt * rate[i] - np.float32(1.0)
+        lack += max(excess, np.float32(0.0))
         before = p.impulse[i]
-        after = before + np.float32(RELAXATION) * excess / (dt * (t + p.sums[i, 1]) + np.float32(1e-6))
+        after = before + np.float32(RELAXATION) * excess / (dt * (t + squares) + np.float32(1e-6))
         p.impulse[i] = max(after, np.float32(0.0))
         p.change[i] = p.impulse[i] - before
+    return lack <= np.float32(ENOUGH) * np.float32(n)
 
 
 @part
@@ -224,9 +241,9 @@ def _accelerate(p, dt, gravity, axis, pivot, speed, growth, damping):
         cx, cy, cz = ay * rz - az * ry, az * rx - ax * rz, ax * ry - ay * rx
         ox, oy, oz = ay * cz - az * cy, az * cx - ax * cz, ax * cy - ay * cx
         kx, ky, kz = ay * s - az * v, az * u - ax * s, ax * v - ay * u
-        p.v[i, 0] = keep * (u + dt * (gx - e * cx - w * w * ox - f(2) * w * kx) + p.sums[i, 5])
-        p.v[i, 1] = keep * (v + dt * (gy - e * cy - w * w * oy - f(2) * w * ky) + p.sums[i, 6])
-        p.v[i, 2] = keep * (s + dt * (gz - e * cz - w * w * oz - f(2) * w * kz) + p.sums[i, 7])
+        p.v[i, 0] = keep * (u + dt * (gx - e * cx - w * w * ox - f(2) * w * kx) + p.sums[i, 4])
+        p.v[i, 1] = keep * (v + dt * (gy - e * cy - w * w * oy - f(2) * w * ky) + p.sums[i, 5])
+        p.v[i, 2] = keep * (s + dt * (gz - e * cz - w * w * oz - f(2) * w * kz) + p.sums[i, 6])
 
 
 @part
@@ -296,12 +313,14 @@ def step(p, walls, dt, iterations, gravity, axis, pivot, speed, growth, damping)
         p.change[i] = p.impulse[i]
     if not _find(p, walls):
         return False
-    _slopes(p, walls)
+    _weigh(p, walls)
     _sum(p, walls)
     _accelerate(p, dt, gravity, axis, pivot, speed, growth, damping)
     for _ in range(iterations):
-        _correct(p, dt)
+        enough = _correct(p, walls, dt)
         _push(p)
+        if enough:
+            break
     _move(p, dt, walls)
     well = True
     for g in range(p.count[1]):
@@ -317,8 +336,8 @@ def density_error(p, walls):
     """
     total, count = 0.0, 0
     for i in range(p.count[0]):
-        open_side = (p.sums[i, 2] ** 2 + p.sums[i, 3] ** 2 + p.sums[i, 4] ** 2) * walls.spacing**2
-        if open_side < 0.04 and p.sums[i, 0] > 0.75:
-            total += abs(p.sums[i, 0] - 1.0)
+        open_side = (p.sums[i, 0] ** 2 + p.sums[i, 1] ** 2 + p.sums[i, 2] ** 2) * walls.spacing**2
+        if open_side < 0.04 and p.sums[i, 3] > 0.75:
+            total += abs(p.sums[i, 3] - 1.0)
             count += 1
     return total, count

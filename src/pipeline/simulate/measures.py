@@ -73,7 +73,7 @@ def calming(name: str, vessel: Vessel, n: int, seed: int) -> list[Row]:
 def _filled(vessel: Vessel, n: int, seed: int) -> Particles:
     start = liquid.settle(vessel, n, seed)
     p = particles(n, vessel.walls)
-    p.x[: len(start)], p.count[0] = start, len(start)
+    p.x[: len(start), :3], p.count[0] = start, len(start)
     return p
 
 

@@ -57,7 +57,7 @@ def pour(
     """
     start = settle(vessel, n, seed)
     p = particles(n, vessel.walls)
-    p.x[: len(start)], p.count[0] = start, len(start)
+    p.x[: len(start), :3], p.count[0] = start, len(start)
     dt = time_step_s(vessel) / substeps
     steps = int((HOLD_S + tilt_s + wait_s) / dt) + 1
     history = np.zeros((steps, 2))

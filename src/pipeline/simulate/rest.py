@@ -4,7 +4,7 @@ Settled states are made once a level (levels 10 % apart) and shared: a trial tak
 particles, takes away those at the top and lets the rest settle for a moment (`HOLD_S`) before it moves.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -19,15 +19,18 @@ ITERATIONS = 3
 SETTLE_S = 1.2
 SETTLE_DAMPING = 0.05  # share of the velocity that a step takes away while settling
 HOLD_S = 0.1
-BRIMFUL, TOPPED = 0, -1  # keys among the settled states
+BRIMFUL, TOPPED = (
+    0,
+    -1,
+)  # keys among the settled states, of the first one at the brim; the others follow in steps of −2
 _LEVELS = 1.1
 _TOP_UP_FROM = 0.93  # of the capacity: a lattice that settles above this splashes over
 _ROOMS = (5, 10, 15, 20)  # particles of 500 that are missing to the capacity before a trial top-up
 _OF = 500
 _TWICE_BELOW = 1000  # particles in all: there one counts for more
-_TOP_UPS = 3
+_TOP_UPS, _STATES = 8, 5  # in a row; the last ones are kept
 _PORTIONS = 300  # a portion set down at once is this part of the capacity, one particle at least
-_PORTION_S = 0.2
+_PORTION_S = 0.1
 _SHAKES, _CALM_SHAKES = 20, 4  # at most; in a row without a loss
 _CALM_S = 0.4  # what would run over sooner or later has done so then
 _INNER = 0.6  # of the opening's radius
@@ -50,12 +53,13 @@ def settle(vessel: Vessel, n: int, seed: int | tuple[int, ...]) -> np.ndarray:
 
     Fewer come back when the vessel does not hold as many: what is missing ran over.
     """
+    rng = np.random.default_rng(seed)
     level = next(level for level in _levels() if level >= n)
-    at_rest = _brimful(vessel) if level > holds(vessel) else _settled(vessel, level)
+    at_rest = _settled(vessel, level) if level <= holds(vessel) else _no_one()
     if len(at_rest) < n:  # a level just below the rim can splash over it while it settles
-        at_rest = _brimful(vessel) if n <= holds(vessel) else _topped(vessel)
+        at_rest = _full(vessel, n, rng)
     lowest = _lowest(at_rest, n)
-    return lowest + np.random.default_rng(seed).normal(0.0, _JITTER * vessel.spacing_m, lowest.shape)
+    return lowest + rng.normal(0.0, _JITTER * vessel.spacing_m, lowest.shape)
 
 
 def settle_all(vessel: Vessel) -> None:
@@ -64,7 +68,6 @@ def settle_all(vessel: Vessel) -> None:
         if level > holds(vessel):
             break
         _settled(vessel, level)
-    _topped(vessel)
 
 
 def _levels() -> Iterator[int]:
@@ -76,7 +79,7 @@ def _levels() -> Iterator[int]:
 
 def holds(vessel: Vessel) -> int:
     """Return how many particles stay for good when the vessel is filled gently until it overflows."""
-    return len(_brimful(vessel))
+    return len(_brimful(vessel)[0])
 
 
 def overflows_at(vessel: Vessel) -> float:
@@ -92,29 +95,50 @@ def _scaled(target: int, room: int) -> int:
     return round(room * max(1.0, target / _OF))
 
 
-def _brimful(vessel: Vessel) -> np.ndarray:
-    """Return what of the topped-up state stays for good (m, 3); made once."""
-    if BRIMFUL not in vessel.settled:
-        vessel.settled[BRIMFUL] = _kept(vessel, _topped(vessel))
-    return vessel.settled[BRIMFUL]
+def _full(vessel: Vessel, n: int, rng: np.random.Generator) -> np.ndarray:
+    """Return one of the states at the brim, as drawn, of those that have n particles; the fullest (m, 3) if none has."""
+    states = _brimful(vessel) if n <= holds(vessel) else _topped(vessel)
+    enough = [state for state in states if len(state) >= n]
+    return enough[rng.integers(len(enough))] if enough else max(states, key=len)
 
 
-def _topped(vessel: Vessel) -> np.ndarray:
-    """Return what is there just before the first particle runs over (m, 3): the middle of some gentle top-ups; made once.
+def _brimful(vessel: Vessel) -> list[np.ndarray]:
+    """Return what of each topped-up state stays for good (m, 3); made once."""
+    return _made_once(vessel, BRIMFUL, lambda: [_kept(vessel, state) for state in _topped(vessel)])
 
-    The first starts from a lattice, each other as a trial does: from the last one less the particles at its top.
+
+def _topped(vessel: Vessel) -> list[np.ndarray]:
+    """Return what is there just before the first particle runs over (m, 3), `_STATES` times, one of middle size first; made once.
+
+    The order of the particles near the brim decides how many it takes. So there are several: gentle top-ups, the first from
+    a lattice, each other as a trial does, from the last one less the particles at its top. The first few still know of the lattice.
     """
-    if TOPPED not in vessel.settled:
+
+    def chain() -> list[np.ndarray]:
         target = particles_for(vessel, vessel.cavity.capacity_m3)
         n = max(int(_TOP_UP_FROM * target), min(target, 8))
         while len(_settled(vessel, n)) < n:  # it splashed over
             n = len(vessel.settled[n]) - 1
         states = [_topped_up(vessel, vessel.settled[n], 0)]
-        for turn, room in enumerate(_ROOMS[:_TOP_UPS], start=1):
-            left = max(len(states[-1]) - _scaled(target, room), 1)
+        for turn in range(1, _TOP_UPS):
+            left = max(len(states[-1]) - _scaled(target, _ROOMS[(turn - 1) % len(_ROOMS)]), 1)
             states.append(_topped_up(vessel, _lowest(states[-1], left), turn))
-        vessel.settled[TOPPED] = sorted(states[1:], key=len)[_TOP_UPS // 2]
-    return vessel.settled[TOPPED]
+        ordered = sorted(states[-_STATES:], key=len)
+        return [ordered.pop(_STATES // 2), *ordered]
+
+    return _made_once(vessel, TOPPED, chain)
+
+
+def _made_once(vessel: Vessel, first: int, make: Callable[[], list[np.ndarray]]) -> list[np.ndarray]:
+    """Return the states at the brim with the keys `first`, `first` − 2, ...; made if they are missing."""
+    keys = range(first, first - 2 * _STATES, -2)
+    if first not in vessel.settled:
+        vessel.settled.update(zip(keys, make(), strict=True))
+    return [vessel.settled[key] for key in keys]
+
+
+def _no_one() -> np.ndarray:
+    return np.zeros((0, 3))
 
 
 def _lowest(at_rest: np.ndarray, n: int) -> np.ndarray:
@@ -128,17 +152,17 @@ def _topped_up(vessel: Vessel, start: np.ndarray, turn: int) -> np.ndarray:
     """
     n, target = len(start), particles_for(vessel, vessel.cavity.capacity_m3)
     p = particles(n + 2 * target + 16, vessel.walls)
-    p.x[:n], p.count[0] = start, n
+    p.x[:n, :3], p.count[0] = start, n
     dt, at_once = time_step_s(vessel), max(1, round(target / _PORTIONS))
     rest(p, vessel.walls, dt, ITERATIONS, int(HOLD_S / dt), SETTLE_DAMPING)
-    before = p.x[: p.count[0]].astype(float)
+    before = p.x[: p.count[0], :3].astype(float)
     for place in range(turn * 1000, turn * 1000 + target, at_once):
         for k in range(at_once):
             _set_down(p, vessel, place + k)
         left, well = rest(p, vessel.walls, dt, ITERATIONS, int(_PORTION_S / dt), 0.0)
         if left > 0 or not well:
             break
-        before = p.x[: p.count[0]].astype(float)
+        before = p.x[: p.count[0], :3].astype(float)
     return _calmed(vessel, before, _CALM_S, SETTLE_DAMPING)
 
 
@@ -158,9 +182,9 @@ def _kept(vessel: Vessel, at_rest: np.ndarray) -> np.ndarray:
 def _calmed(vessel: Vessel, start: np.ndarray, seconds: float, damping: float) -> np.ndarray:
     """Return what stays of particles (m, 3) that start without speed."""
     p, dt = particles(len(start), vessel.walls), time_step_s(vessel)
-    p.x[: len(start)], p.count[0] = start, len(start)
+    p.x[: len(start), :3], p.count[0] = start, len(start)
     rest(p, vessel.walls, dt, ITERATIONS, int(seconds / dt), damping)
-    return p.x[: p.count[0]].astype(float)
+    return p.x[: p.count[0], :3].astype(float)
 
 
 def _set_down(p: Particles, vessel: Vessel, place: int) -> None:
@@ -171,7 +195,7 @@ def _set_down(p: Particles, vessel: Vessel, place: int) -> None:
     radius = vessel.cavity.rim_at(opening[0] + out[:1], opening[1] + out[1:])[0][0]
     x, y = opening[:2] + share * radius * out
     under = np.hypot(p.x[:n, 0] - x, p.x[:n, 1] - y) < s
-    p.x[n] = x, y, p.x[:n][under, 2].max(initial=vessel.cavity.origin_m[2]) + _ABOVE * s
+    p.x[n, :3] = x, y, p.x[:n][under, 2].max(initial=vessel.cavity.origin_m[2]) + _ABOVE * s
     p.v[n], p.impulse[n], p.count[0] = 0.0, 0.0, n + 1
 
 
@@ -180,10 +204,10 @@ def _settled(vessel: Vessel, n: int) -> np.ndarray:
     if n not in vessel.settled:
         p = particles(n, vessel.walls)
         start = _lattice(vessel, n)
-        p.x[: len(start)], p.count[0] = start, len(start)
+        p.x[: len(start), :3], p.count[0] = start, len(start)
         dt = time_step_s(vessel)
         rest(p, vessel.walls, dt, ITERATIONS, int(SETTLE_S / dt), SETTLE_DAMPING)
-        vessel.settled[n] = p.x[: p.count[0]].astype(float)
+        vessel.settled[n] = p.x[: p.count[0], :3].astype(float)
     return vessel.settled[n]
 
 

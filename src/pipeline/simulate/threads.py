@@ -12,11 +12,12 @@ def _trial(r, t):
     """Return the particles of trial t, at rest."""
     for i in range(r.count[t, 0]):
         r.impulse[t, i] = 0.0
-        r.v[t, i, 0] = r.v[t, i, 1] = r.v[t, i, 2] = 0.0
+        for c in range(4):
+            r.v[t, i, c] = 0.0
     return Particles(
         r.x[t], r.v[t], r.impulse[t], r.count[t], r.gone_x[t], r.gone_v[t], r.gone_how[t],
         r.spare_x[t], r.spare_v[t], r.spare_impulse[t], r.bin_of[t], r.bin_start[t], r.first[t],
-        r.other[t], r.weight[t], r.slope_x[t], r.slope_y[t], r.slope_z[t], r.sums[t], r.wall[t], r.change[t],
+        r.other[t], r.weight[t], r.factor[t], r.slope[t], r.sums[t], r.wall[t], r.change[t],
     )  # fmt: skip
 
 

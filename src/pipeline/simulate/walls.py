@@ -15,9 +15,9 @@ from pipeline.simulate.rest import overflows_at, particles_for
 __all__ = ["Vessel", "vessel"]
 
 LOWERED = 0.75  # spacings: a particle's centre stays that far above what it flows over
-TOLERANCE = 0.005
+TOLERANCE = 0.003
 _RANGE = (0.25, 1.25)
-_TRIALS = 5
+_TRIALS = 6
 
 
 def vessel(cavity: Cavity, spacing_m: float) -> Vessel:
