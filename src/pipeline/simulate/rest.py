@@ -27,11 +27,11 @@ _LEVELS = 1.1
 _TOP_UP_FROM = 0.93  # of the capacity: a lattice that settles above this splashes over
 _ROOMS = (5, 10, 15, 20)  # particles of 500 that are missing to the capacity before a trial top-up
 _OF = 500
-_TWICE_BELOW = 1000  # particles in all: there one counts for more
+_RUNS, _RUNS_OF_MANY, _MANY = 16, 4, 1000  # top-ups of a trial's liquid; fewer where a vessel holds many, as one counts for less
 _TOP_UPS, _STATES = 8, 5  # in a row; the last ones are kept
 _PORTIONS = 300  # a portion set down at once is this part of the capacity, one particle at least
 _PORTION_S = 0.1
-_SHAKES, _CALM_SHAKES = 20, 4  # at most; in a row without a loss
+_SHAKES, _CALM_SHAKES, _SHAKE_S = 20, 4, 0.6  # at most; in a row without a loss; how long each
 _CALM_S = 0.4  # what would run over sooner or later has done so then
 _INNER = 0.6  # of the opening's radius
 _ABOVE = 0.8  # spacings from a particle on the surface to one set down on it
@@ -85,7 +85,8 @@ def holds(vessel: Vessel) -> int:
 def overflows_at(vessel: Vessel) -> float:
     """Return how many particles are there just before the first runs over when a trial's liquid is topped up: a mean."""
     target = particles_for(vessel, vessel.cavity.capacity_m3)
-    missing = [_scaled(target, room) for room in _ROOMS * (2 if target < _TWICE_BELOW else 1)]
+    runs = _RUNS if target < _MANY else _RUNS_OF_MANY
+    missing = [_scaled(target, room) for room in _ROOMS * (runs // len(_ROOMS))]
     starts = [settle(vessel, max(target - room, 1), turn) for turn, room in enumerate(missing)]
     return float(np.mean([len(_topped_up(vessel, start, 1 + turn)) for turn, start in enumerate(starts)]))
 
@@ -172,7 +173,7 @@ def _kept(vessel: Vessel, at_rest: np.ndarray) -> np.ndarray:
     for turn in range(_SHAKES):
         n, rng = len(at_rest), np.random.default_rng(turn)
         shaken = at_rest + rng.normal(0.0, _JITTER * vessel.spacing_m, at_rest.shape)
-        at_rest = _calmed(vessel, shaken, SETTLE_S, 0.0)
+        at_rest = _calmed(vessel, shaken, _SHAKE_S, 0.0)
         calm = calm + 1 if len(at_rest) == n else 0
         if calm == _CALM_SHAKES:
             break
