@@ -116,8 +116,10 @@ def test_rescaled_features_give_the_same_scores_on_the_training_object():
 def test_splits_leave_out_the_training_samples_and_hold_all_others():
     table = trials()
     results = evaluated(table, {"standard": features(table, parameters(), standard=True)})
-    for tested in results.predictions:
-        split, training = tested["split"].iloc[0], tested["training_object"].iloc[0]
+    predictions = results.predictions(table, table["poured"].to_numpy(bool))
+    for (split, training, _), tested in predictions.groupby(
+        ["split", "training_object", "draw"], observed=True
+    ):
         own = tested["test_object"] == training
         assert len(tested) == (150 if split == "same" else 200)
         assert own.all() if split == "same" else not own.any()

@@ -33,9 +33,9 @@ def main() -> None:
     write_table(options.scores, pd.DataFrame(results.scores), "scores")
     write_table(options.replicates, resampled.table("features", "split").assign(**head), "replicates")
     if options.predictions:
-        write_table(options.predictions, pd.concat(results.predictions, ignore_index=True), "predictions")
+        write_table(options.predictions, results.predictions(given.trials, given.labels), "predictions")
     if options.curves:
-        write_table(options.curves, pd.concat(results.curves, ignore_index=True), "curves")
+        write_table(options.curves, results.curves(), "curves")
     if options.models:
         write_models(options.models, results.models)
     if options.pairs:

@@ -51,14 +51,14 @@ class TrainingSet:
 
 @dataclass
 class Results:
-    """Rows of the tables `predictions` (a frame a classifier), `scores` and `curves`, and the classifiers themselves."""
+    """What classifiers did: rows of the table `scores`, the classifiers themselves, and what two more tables are made of."""
 
     resampled: Resampled
     keep_predictions: bool = True
-    predictions: list[pd.DataFrame] = field(default_factory=list)
     scores: list[dict[str, Any]] = field(default_factory=list)
-    curves: list[pd.DataFrame] = field(default_factory=list)
     models: list[Model] = field(default_factory=list)
+    _curves: list[tuple[dict[str, Any], np.ndarray]] = field(default_factory=list)
+    _tested: list[tuple[dict[str, Any], np.ndarray, np.ndarray]] = field(default_factory=list)
 
     def add_score(
         self, head: dict[str, Any], outcome: Score, labels: np.ndarray, training: dict[str, Any]
@@ -69,7 +69,37 @@ class Results:
         self.scores.append(
             {**head, "auc": outcome.auc, "brier": outcome.brier, **rates, **counts, **training}
         )
-        self.curves.append(pd.DataFrame({**head, "fpr": FPR_GRID, "tpr": outcome.tpr}))
+        self._curves.append((head, outcome.tpr))
+
+    def add_predictions(self, head: dict[str, Any], rows: np.ndarray, probability: np.ndarray) -> None:
+        """Record what one classifier said of some rows of the trials, both (n,)."""
+        if self.keep_predictions:
+            self._tested.append((head, rows, probability.astype(np.float32)))
+
+    def curves(self) -> pd.DataFrame:
+        """Return the table `curves`."""
+        heads = _repeated([head for head, _ in self._curves], [len(FPR_GRID)] * len(self._curves))
+        tpr = np.concatenate([tpr for _, tpr in self._curves])
+        return heads.assign(fpr=np.tile(FPR_GRID, len(self._curves)), tpr=tpr)
+
+    def predictions(self, trials: pd.DataFrame, labels: np.ndarray) -> pd.DataFrame:
+        """Return the table `predictions` of the trials (N rows) and labels (N,) that were tested on."""
+        heads = _repeated([head for head, _, _ in self._tested], [len(rows) for _, rows, _ in self._tested])
+        rows = np.concatenate([rows for _, rows, _ in self._tested])
+        return heads.assign(
+            test_object=trials["object"].astype("category").array.take(rows),
+            trial=trials["trial"].to_numpy()[rows],
+            probability=np.concatenate([probability for _, _, probability in self._tested]),
+            label=labels[rows],
+        )
+
+
+def _repeated(heads: list[dict[str, Any]], counts: list[int]) -> pd.DataFrame:
+    """Return a table in which row k repeats heads[k] counts[k] times; texts as categories, of which there are few."""
+    table = pd.DataFrame(heads)
+    texts = [name for name, value in heads[0].items() if isinstance(value, str)]
+    each = table.astype(dict.fromkeys(texts, "category"))
+    return each.take(np.repeat(np.arange(len(each)), counts)).reset_index(drop=True)
 
 
 def draw_training_set(
@@ -174,10 +204,7 @@ def _test(
         full = {**head, "features": features, "split": split}
         results.add_score(full, score(labels[rows], probability[rows]), labels[rows], training)
         results.resampled.add((features, split), name, objects[rows], labels[rows], probability[rows])
-        if results.keep_predictions:
-            tested = {"test_object": objects[rows], "trial": trials["trial"].to_numpy()[rows]}
-            outcome = {"probability": probability[rows].astype(np.float32), "label": labels[rows]}
-            results.predictions.append(pd.DataFrame({**full, **tested, **outcome}))
+        results.add_predictions(full, rows, probability[rows])
 
 
 def splits(objects: np.ndarray, drawn: TrainingSet) -> Iterator[tuple[str, np.ndarray]]:

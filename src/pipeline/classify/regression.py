@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import linprog
 from sklearn.linear_model import LogisticRegression
-from sklearn.metrics import brier_score_loss, roc_auc_score, roc_curve
+from sklearn.metrics import auc, roc_curve
 from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import FunctionTransformer, StandardScaler
 
@@ -68,5 +68,5 @@ def score(labels: np.ndarray, probabilities: np.ndarray, *, margins: bool = Fals
     """Return the score of probabilities (or any `margins` that grow with them) for labels, both (N,)."""
     fpr, tpr, _ = roc_curve(labels, probabilities, drop_intermediate=False)
     at_most = np.searchsorted(fpr, FPR_GRID + 1e-12, side="right") - 1
-    brier = np.nan if margins else brier_score_loss(labels, probabilities)
-    return Score(float(roc_auc_score(labels, probabilities)), float(brier), tpr[at_most])
+    brier = np.nan if margins else np.mean((probabilities - labels) ** 2)
+    return Score(float(auc(fpr, tpr)), float(brier), tpr[at_most])

@@ -31,7 +31,7 @@ def _cache_folder() -> str:
 
 
 # Off in numba since LLVM 11, which made wrong code with it (numba 8852); LLVM 20 is tested with it on. A fifth of the time.
-numba.config.SLP_VECTORIZE = 1
+numba.config.SLP_VECTORIZE = 1  # type: ignore[attr-defined]
 numba.config.CACHE_DIR = _cache_folder()  # type: ignore[attr-defined]
 
 compiled = njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")

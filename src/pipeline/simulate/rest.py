@@ -27,7 +27,11 @@ _LEVELS = 1.1
 _TOP_UP_FROM = 0.93  # of the capacity: a lattice that settles above this splashes over
 _ROOMS = (5, 10, 15, 20)  # particles of 500 that are missing to the capacity before a trial top-up
 _OF = 500
-_RUNS, _RUNS_OF_MANY, _MANY = 16, 4, 1000  # top-ups of a trial's liquid; fewer where a vessel holds many, as one counts for less
+_RUNS, _RUNS_OF_MANY, _MANY = (
+    16,
+    4,
+    1000,
+)  # top-ups of a trial's liquid; fewer where a vessel holds many, as one counts for less
 _TOP_UPS, _STATES = 8, 5  # in a row; the last ones are kept
 _PORTIONS = 300  # a portion set down at once is this part of the capacity, one particle at least
 _PORTION_S = 0.1

@@ -22,7 +22,18 @@ def weighted_rates(
     counts = [np.bincount(groups[labels == true], minlength=weights.shape[1]) for true in (True, False)]
     weights = np.asarray(weights, float)
     positives, negatives = (weights @ count for count in counts)
-    return _sweep(labels[order], groups[order].astype(np.int64), tie_end, weights, positives, negatives)
+    limits = np.vstack([(FPRS[:, None] + 1e-12) * negatives, PARTIAL_FPR * negatives])
+    sums = np.zeros((2 + len(FPRS), len(weights)))
+    _sweep(
+        labels[order], groups[order].astype(np.int64), tie_end, np.ascontiguousarray(weights.T), limits, sums
+    )
+    out = np.full((len(weights), 2 + len(FPRS)), np.nan)
+    both = (positives > 0.0) & (negatives > 0.0)
+    positives, negatives, sums = positives[both], negatives[both], sums[:, both]
+    out[both, 0] = sums[0] / positives / negatives
+    out[both, 1] = sums[1] / positives / limits[-1, both]
+    out[both, 2:] = (sums[2:] / positives).T
+    return out
 
 
 @njit(cache=True)
@@ -31,46 +42,40 @@ def _sweep(
     groups: np.ndarray,
     tie_end: np.ndarray,
     weights: np.ndarray,
-    positives: np.ndarray,
-    negatives: np.ndarray,
-) -> np.ndarray:
-    out = np.full((len(weights), 5), np.nan)
-    for r in range(len(weights)):
-        if positives[r] > 0.0 and negatives[r] > 0.0:
-            _measure(labels, groups, tie_end, weights[r], positives[r], negatives[r], out[r])
-    return out
-
-
-@njit(cache=True)
-def _measure(
-    labels: np.ndarray,
-    groups: np.ndarray,
-    tie_end: np.ndarray,
-    weight: np.ndarray,
-    positives: float,
-    negatives: float,
-    out: np.ndarray,
+    limits: np.ndarray,
+    sums: np.ndarray,
 ) -> None:
-    area = partial = true = false = true_before = false_before = 0.0
-    limit, found = PARTIAL_FPR * negatives, np.zeros(len(FPRS))
-    allowed = (FPRS + 1e-12) * negatives
+    """Go down the sorted trials (N,) once for all weightings, weights (G, R); the inner loops run over R, in vectors.
+
+    Adds to sums (5, R): the area, that up to the last of `limits` (4, R), true positives at the others; in units of weight.
+    """
+    n_weightings = weights.shape[1]
+    true, false = np.zeros(n_weightings), np.zeros(n_weightings)
+    true_before, false_before = np.zeros(n_weightings), np.zeros(n_weightings)
+    area, partial, found = sums[0], sums[1], sums[2:]
+    early = True
     for n in range(len(labels)):
+        weight = weights[groups[n]]
         if labels[n]:
-            true += weight[groups[n]]
+            for r in range(n_weightings):
+                true[r] += weight[r]
         else:
-            false += weight[groups[n]]
+            for r in range(n_weightings):
+                false[r] += weight[r]
         if not tie_end[n]:
             continue
-        step = false - false_before
-        if false_before < limit:
-            if step > 0.0:
-                inside = min(step, limit - false_before)
-                partial += inside * (true_before + (true - true_before) * inside / step / 2.0)
-            for k in range(len(allowed)):
-                if false <= allowed[k]:
-                    found[k] = true
-        if step > 0.0:
-            area += step * (true + true_before) / 2.0
-        true_before, false_before = true, false
-    out[0], out[1] = area / positives / negatives, partial / positives / limit
-    out[2:] = found / positives
+        if early:
+            room = 0.0
+            for r in range(n_weightings):
+                step = false[r] - false_before[r]
+                inside = max(min(step, limits[3, r] - false_before[r]), 0.0)
+                share = inside / step if step > 0.0 else 0.0
+                partial[r] += inside * (true_before[r] + (true[r] - true_before[r]) * share / 2.0)
+                room = max(room, limits[3, r] - false[r])
+                for k in range(3):
+                    if false[r] <= limits[k, r]:
+                        found[k, r] = true[r]
+            early = room > 0.0
+        for r in range(n_weightings):
+            area[r] += (false[r] - false_before[r]) * (true[r] + true_before[r]) / 2.0
+            true_before[r], false_before[r] = true[r], false[r]
