@@ -40,7 +40,7 @@ def test_filled_gently_it_overflows_when_its_free_room_is_taken(
     excess = [
         np.mean([taken_before_it_overflows(vessel, room, seed) for seed in SEEDS]) - room for room in ROOMS
     ]
-    assert abs(np.mean(excess)) < 3
+    assert abs(np.mean(excess)) < 0.01 * liquid.holds(vessel)
     assert np.abs(excess).max() < 0.02 * liquid.holds(vessel)
 
 

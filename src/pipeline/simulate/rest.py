@@ -87,12 +87,18 @@ def holds(vessel: Vessel) -> int:
 
 
 def overflows_at(vessel: Vessel) -> float:
-    """Return how many particles are there just before the first runs over when a trial's liquid is topped up: a mean."""
-    target = particles_for(vessel, vessel.cavity.capacity_m3)
-    runs = _RUNS if target < _MANY else _RUNS_OF_MANY
-    missing = [_scaled(target, room) for room in _ROOMS * (runs // len(_ROOMS))]
-    starts = [settle(vessel, max(target - room, 1), turn) for turn, room in enumerate(missing)]
-    return float(np.mean([len(_topped_up(vessel, start, 1 + turn)) for turn, start in enumerate(starts)]))
+    """Return how many particles are there just before the first runs over when liquid at rest is topped up: a mean.
+
+    From each of the states at the brim, with some free room, as a trial starts.
+    """
+    target, states = particles_for(vessel, vessel.cavity.capacity_m3), _topped(vessel)
+    rooms = _ROOMS * ((_RUNS if target < _MANY else _RUNS_OF_MANY) // len(_ROOMS))
+    found = []
+    for turn, room in enumerate(rooms):
+        start = _lowest(states[turn % len(states)], max(target - _scaled(target, room), 1))
+        jitter = np.random.default_rng(turn).normal(0.0, _JITTER * vessel.spacing_m, start.shape)
+        found.append(len(_topped_up(vessel, start + jitter, 1 + turn)))
+    return float(np.mean(found))
 
 
 def _scaled(target: int, room: int) -> int:

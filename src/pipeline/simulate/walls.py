@@ -18,6 +18,7 @@ LOWERED = 0.75  # spacings: a particle's centre stays that far above what it flo
 TOLERANCE = 0.003
 _RANGE = (0.25, 1.25)
 _TRIALS = 6
+_STEP = 0.01  # spacings: nearer to one that was tried nothing else happens
 
 
 def vessel(cavity: Cavity, spacing_m: float) -> Vessel:
@@ -25,7 +26,10 @@ def vessel(cavity: Cavity, spacing_m: float) -> Vessel:
     layer = np.pi * np.hypot(*(cavity.rim_m - cavity.opening_m)[:, :2].T).mean() ** 2 / spacing_m**2
     tried: list[tuple[float, Vessel]] = []
     for _ in range(_TRIALS):
-        candidate = precompute(cavity, spacing_m, _next_lowered(tried, layer))
+        lowered = _next_lowered(tried, layer)
+        if any(abs(lowered - each.lowered) < _STEP for _, each in tried):
+            break
+        candidate = precompute(cavity, spacing_m, lowered)
         target = particles_for(candidate, cavity.capacity_m3)
         tried.append((overflows_at(candidate) - target, candidate))
         if abs(tried[-1][0]) <= TOLERANCE * target:
