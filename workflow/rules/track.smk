@@ -1,14 +1,14 @@
 # Needs what a call of Snakemake left behind: outputs, benchmarks, Snakemake's own log.
 # Makes the call's runs in MLflow (default: mlflow.db, mlartifacts/) and logs/track/calls/, what was said of each call; no rule depends on them.
-# How: called by the Snakefile's handlers, once before the first job and once after the last; it never fails a call.
+# How: called by the Snakefile's handlers, once beside the first job and once after the last; it never fails a call.
 
 import json
 from pathlib import Path
 
 
 def track_start():
-    """Return the command that prepares the store, before anything runs in parallel."""
-    return "python -m pipeline.track start || true" if config["track"]["enabled"] else "true"
+    """Return the command that prepares the store, while the first jobs run: a fresh one takes seconds."""
+    return "(python -m pipeline.track start || true) &" if config["track"]["enabled"] else "true"
 
 
 def track_end(status, log):
