@@ -1,3 +1,4 @@
+import json
 import os
 import pickle
 import subprocess
@@ -107,6 +108,31 @@ def test_single_precision_gives_the_labels_that_double_gives(
     double = [pour(finer, *draw).n_left for draw in draws]
     assert double != single  # it really was another computation
     assert [left > 0 for left in double] == [left > 0 for left in single]
+
+
+def test_ending_the_pressure_iterations_early_gives_the_labels_that_all_of_them_give(
+    cylinder: Vessel, tmp_path: Path
+) -> None:
+    """The share of the density's excess at which they end is compiled in: with all iterations in a process of its own."""
+    rng = np.random.default_rng(4)
+    draws = [(int(rng.integers(20, 400)), round(rng.uniform(0.0, 110.0), 3), seed) for seed in range(1, 41)]
+    early = [pour(cylinder, *draw).n_left for draw in draws]
+    program = (
+        "import json, pickle, sys, numpy as np; from pipeline.simulate import kernels, liquid; kernels.ENOUGH = -1.0;"
+        "from pipeline.geometry.cavity import lip_alone, pour_axis; v = pickle.load(open(sys.argv[1], 'rb'));"
+        "lip = lip_alone(v.cavity); axis = pour_axis(v.cavity.opening_m, lip);"
+        "print([liquid.pour(v, n, lip, axis, np.radians(t), s).n_left for n, t, s in json.loads(sys.argv[2])])"
+    )
+    with (tmp_path / "vessel.pickle").open("wb") as file:
+        pickle.dump(cylinder, file)
+    command = [sys.executable, "-c", program, str(tmp_path / "vessel.pickle"), json.dumps(draws)]
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    run = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    complete = json.loads(run.stdout.splitlines()[-1])
+    assert complete != early  # it really was another computation
+    assert [left > 0 for left in complete] == [left > 0 for left in early]
+    counts = np.array([n for n, _, _ in draws])
+    assert np.mean(np.abs(np.array(complete) - early) / counts) < 0.02
 
 
 def test_the_same_arguments_give_the_same_bits_on_any_thread(cylinder: Vessel) -> None:
