@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pipeline.artefacts import points, read_json, read_table
+from pipeline.artefacts import points, read_columns, read_json
 from pipeline.errors import PipelineError
 from pipeline.geometry import frames
 from pipeline.label.classifier import PARTS
@@ -13,10 +13,12 @@ from pipeline.label.classifier import PARTS
 
 def source_parts(annotation: Path, fusion: Path, points_m: np.ndarray) -> np.ndarray:
     """Return the annotated parts (N, 3 bool) of the source's points (N, 3), object frame; `fusion` tells where that is."""
-    painted = read_table(annotation, "annotation")
+    painted = read_columns(annotation, "annotation")
     T_object_world = np.array(read_json(fusion)["T_object_world"])
     painted_m = frames.apply(T_object_world, points(painted))
-    return transfer_annotation(painted_m, painted[list(PARTS)].to_numpy(bool), points_m, name=str(annotation))
+    return transfer_annotation(
+        painted_m, np.column_stack([painted[part] for part in PARTS]), points_m, name=str(annotation)
+    )
 
 
 def transfer_annotation(
