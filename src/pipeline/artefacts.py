@@ -6,16 +6,21 @@ import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from pipeline import columns as plain
+from pipeline.columns import Columns
 from pipeline.errors import PipelineError
 from pipeline.schemas import TABLES
 
+if TYPE_CHECKING:
+    import pandas as pd
+
+Frame = Union["pd.DataFrame", Columns]
 Mesh = tuple[np.ndarray, np.ndarray]
 Arrays = dict[str, np.ndarray]
 
@@ -33,13 +38,16 @@ def replacing(path: str | Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def write_table(path: str | Path, frame: pd.DataFrame, table: str) -> None:
+def write_table(path: str | Path, frame: Frame, table: str) -> None:
     """Write `frame` as zstd Parquet; its columns must be those of `TABLES[table]`, in any order."""
     schema = TABLES[table]
-    _check_columns(path, table, list(frame.columns))
+    _check_columns(path, table, list(frame))
     try:
-        arrow = pa.Table.from_pandas(frame[schema.names], schema=schema, preserve_index=False)
-    except (pa.ArrowInvalid, pa.ArrowTypeError) as error:
+        if isinstance(frame, dict):
+            arrow = plain.to_arrow(frame, schema)
+        else:
+            arrow = pa.Table.from_pandas(frame[schema.names], schema=schema, preserve_index=False)
+    except (pa.ArrowInvalid, TypeError) as error:
         raise PipelineError(
             f"{path}: a column does not fit the schema of table '{table}': {error}"
         ) from error
@@ -47,12 +55,21 @@ def write_table(path: str | Path, frame: pd.DataFrame, table: str) -> None:
         pq.write_table(arrow.replace_schema_metadata(None), temporary, compression="zstd")
 
 
-def read_table(path: str | Path, table: str, columns: list[str] | None = None) -> pd.DataFrame:
+def read_table(path: str | Path, table: str, columns: list[str] | None = None) -> "pd.DataFrame":
     """Read a Parquet file as table `table` (all columns, or the named ones)."""
+    return _read(path, table, columns).to_pandas()
+
+
+def read_columns(path: str | Path, table: str) -> Columns:
+    """Read a Parquet file as table `table`, without pandas; for the stages that every object goes through."""
+    return plain.to_numpy(_read(path, table))
+
+
+def _read(path: str | Path, table: str, columns: list[str] | None = None) -> pa.Table:
     try:
-        names = pq.read_schema(path).names
-        _check_columns(path, table, names)
-        return pq.read_table(path, columns=columns).to_pandas()
+        with pq.ParquetFile(path) as file:
+            _check_columns(path, table, file.schema_arrow.names)
+            return file.read(columns)
     except (OSError, pa.ArrowInvalid) as error:
         raise PipelineError(
             f"{path}: expected a Parquet table '{table}', but it cannot be read: {error}"
@@ -133,17 +150,17 @@ def write_film(path: str | Path, pictures: Sequence[np.ndarray], every_s: float)
         )
 
 
-def points(frame: pd.DataFrame) -> np.ndarray:
+def points(frame: Frame) -> np.ndarray:
     """Return the columns x_m, y_m, z_m as an array (N, 3) in metres."""
-    return frame[["x_m", "y_m", "z_m"]].to_numpy(float)
+    return np.array([frame["x_m"], frame["y_m"], frame["z_m"]], float).T
 
 
-def normals(frame: pd.DataFrame) -> np.ndarray:
+def normals(frame: Frame) -> np.ndarray:
     """Return the columns nx, ny, nz as an array (N, 3) of unit vectors."""
-    return frame[["nx", "ny", "nz"]].to_numpy(float)
+    return np.array([frame["nx"], frame["ny"], frame["nz"]], float).T
 
 
-def poses(frame: pd.DataFrame) -> np.ndarray:
+def poses(frame: "pd.DataFrame") -> np.ndarray:
     """Return the columns x_m, y_m, z_m, qx, qy, qz, qw as poses (N, 4, 4)."""
     from scipy.spatial.transform import Rotation
 
@@ -153,7 +170,7 @@ def poses(frame: pd.DataFrame) -> np.ndarray:
     return T
 
 
-def T_world_second(trajectory: pd.DataFrame) -> np.ndarray:
+def T_world_second(trajectory: "pd.DataFrame") -> np.ndarray:
     """Return where the second container of a trajectory stands (4, 4): upright on the table."""
     T = np.eye(4)
     T[:2, 3] = trajectory[["second_x_m", "second_y_m"]].iloc[0]

@@ -161,7 +161,9 @@ def test_two_sides_of_a_sheet_are_told_apart():
     projection[:, 2, 3] = 1.0
     near = np.ones((9, 1, 1), bool)
     lowest = np.array([-3, 0, 0])
-    value, weight = signed_distances(lowest, 0.0005, near[:, :, 0], near, plane, view, projection, 0.01)
+    value, weight = signed_distances(
+        lowest, 0.0005, near[:, :, 0], near[0, 0], near, plane, view, projection, 0.01
+    )
     x_m = (lowest[0] + np.arange(9)) * 0.0005
     expected = np.maximum(x_m - 0.001, -x_m)
     np.testing.assert_allclose(value[:, 0, 0] * 0.01, expected, atol=1e-7)

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from conftest import PARTS, sampled
+from scipy.spatial import cKDTree
 
 from pipeline.artefacts import points
 from pipeline.errors import PipelineError
@@ -58,6 +59,29 @@ def test_annotation_is_carried_to_the_nearest_points():
     cloud = sampled("mug")
     carried = transfer_annotation(points(cloud)[::2], cloud[PARTS].to_numpy()[::2], points(cloud), name="mug")
     assert (carried == cloud[PARTS].to_numpy()).mean() > 0.97
+
+
+def test_borders_of_a_coarse_annotation_run_straight_between_its_points():
+    points_m = points(sampled("mug"))
+    band = np.column_stack(
+        [points_m[:, 2] < 0.05, np.abs(points_m[:, 2] - 0.091) < 0.004, points_m[:, 0] > 0.02]
+    )
+    painted_m, painted = points_m[::4], band[::4]
+    carried = transfer_annotation(painted_m, painted, points_m, name="mug")
+    nearest = painted[cKDTree(painted_m).query(points_m)[1]]
+    assert (carried != band).sum() < 0.75 * (nearest != band).sum()
+    # Neither wider nor narrower than they were painted.
+    assert carried.sum(axis=0) == pytest.approx(band.sum(axis=0), rel=0.05)
+
+
+@pytest.mark.parametrize("painted", [1, 3])
+def test_an_annotation_of_few_points_is_carried_too(painted):
+    painted_m = np.array([[0.0, 0.0, 0.0], [0.001, 0.0, 0.0], [0.001, 0.0, 0.0]])[:painted]
+    parts = np.array([[True, False, False], [True, True, False], [True, True, False]])[:painted]
+    carried = transfer_annotation(
+        painted_m, parts, np.array([[-0.001, 0.0, 0.0], [0.002, 0.0, 0.0]]), name="mug"
+    )
+    np.testing.assert_array_equal(carried, parts[[0, -1]])
 
 
 def test_annotation_of_another_scan_is_refused():

@@ -5,10 +5,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
 import yaml
 
-from pipeline.report.accuracy import errors
+from pipeline.report.accuracy import errors, label_scores
 from pipeline.report.metrics import accuracy_metrics, warp_metrics
 
 ROOT = Path(__file__).parents[2]
@@ -32,6 +34,23 @@ def metrics(tmp_path_factory) -> dict[str, float]:
     processed = folder / "data/processed"
     found = {name: errors(processed, "mug", name) for name in NAMES}
     return accuracy_metrics(found) | warp_metrics(processed, "mug", NAMES)
+
+
+def test_balanced_accuracy_is_the_mean_over_targets_of_the_mean_over_rim_and_handle():
+    parts = np.array([[True, True, False]] * 4 + [[True, False, False]] * 4 + [[False, False, True]] * 2)
+    found = pd.DataFrame(parts, columns=["container", "rim", "handle"])
+    found.loc[0, "rim"], found.loc[8, "handle"] = False, False
+    with_handle = label_scores(found, parts)
+    assert with_handle["balanced_accuracy"] == pytest.approx((0.875 + 0.75) / 2)
+    without = label_scores(found[:8], parts[:8])
+    assert without["balanced_accuracy"] == without["rim.balanced_accuracy"] == pytest.approx(0.875)
+    of_objects = {
+        name: {"fuse.inner_error_mm_mean": 0.0, "fuse.outer_error_mm_mean": 0.0}
+        | {f"warp_label_mapping.{key}": value for key, value in scores.items()}
+        for name, scores in (("jug", with_handle), ("cup", without))
+    }
+    over_targets = accuracy_metrics(of_objects)["warp.label_mapping.balanced_accuracy"]
+    assert over_targets == pytest.approx((0.8125 + 0.875) / 2)
 
 
 def test_fused_surfaces_are_near_the_true_ones_on_both_sides_of_the_wall(metrics):

@@ -17,6 +17,7 @@ LEAST_OF_A_VIEW = 0.2
 MOST_LEFT_OUT = 0.2  # of the views
 NEAREST_M, FURTHEST_M = 0.1, 10.0  # of what stands on a table, from a depth camera
 POINTS, PAIRS = 400, 200
+_RANGE_STEP = 16  # pixels
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ def only(views: Views, kept: np.ndarray) -> Views:
 
 
 def _check_range(views: Views, name: str) -> None:
-    depths = np.array([np.median(depth[depth > 0]) for depth in views.depths_m if depth.any()])
+    depths = np.array([np.median(depth[depth > 0][::_RANGE_STEP]) for depth in views.depths_m if depth.any()])
     median = float(np.median(depths))
     if not NEAREST_M < median < FURTHEST_M:
         raise PipelineError(
@@ -123,15 +124,23 @@ def agreement(views: Views, sample: Sample, T_world_cameras: np.ndarray, depth_f
     """
     n = len(sample.points_m)
     alike, seen = np.zeros(n), np.zeros(n)
+    places = [
+        frames.apply(T, points * depth_factor)
+        for T, points in zip(T_world_cameras, sample.points_m, strict=True)
+    ]
     T_camera_worlds = np.linalg.inv(T_world_cameras)
-    for i, j in sample.pairs:
-        points = frames.apply(T_camera_worlds[j] @ T_world_cameras[i], sample.points_m[i] * depth_factor)
+    for j in range(n):
+        others = sample.pairs[sample.pairs[:, 1] == j, 0]
+        if len(others) == 0:
+            continue
+        own = np.repeat(others, [len(places[i]) for i in others])
+        points = frames.apply(T_camera_worlds[j], np.concatenate([places[i] for i in others]))
         measured, expected = projected(points, views.intrinsics[j], views.depths_m[j])
         there = measured > 0
         near = np.abs(measured * depth_factor - expected) < TOLERANCE_M + TOLERANCE_SHARE * np.abs(expected)
-        for k in (i, j):
-            alike[k] += np.count_nonzero(near & there)
-            seen[k] += np.count_nonzero(there)
+        for total, counted in ((alike, near & there), (seen, there)):
+            total += np.bincount(own[counted], minlength=n)
+            total[j] += np.count_nonzero(counted)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(seen >= 0.02 * POINTS, alike / seen, np.nan)
 

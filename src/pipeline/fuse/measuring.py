@@ -22,11 +22,11 @@ OUTLINE_BIAS_M = 0.00025
 
 
 @numba.njit(cache=True)
-def signed_distances(lowest, voxel, columns, near, plane, view, projection, truncation):  # type: ignore[no-untyped-def]
+def signed_distances(lowest, voxel, columns, layers, near, plane, view, projection, truncation):  # type: ignore[no-untyped-def]
     """Return signed distances (nx, ny, nz) in truncations, positive in the open, and how many views told.
 
-    lowest (3,): coordinates of the first voxel. columns (nx, ny): where to look at all. near (nx, ny, nz): where a surface may be;
-    elsewhere two views that see past are enough. The arrays of `Planes`; truncation in metres.
+    lowest (3,): coordinates of the first voxel. columns (nx, ny), layers (nz,): where to look at all. near (nx, ny,
+    nz): where a surface may be; elsewhere two views that see past are enough. The arrays of `Planes`; truncation in metres.
     """
     nx, ny, nz = near.shape
     value, weight = np.zeros((nx, ny, nz), np.float32), np.zeros((nx, ny, nz), np.float32)
@@ -37,7 +37,7 @@ def signed_distances(lowest, voxel, columns, near, plane, view, projection, trun
                 continue
             x, y = (lowest[0] + ix) * voxel, (lowest[1] + iy) * voxel
             column[:] = projection[:, :, 0] * x + projection[:, :, 1] * y + projection[:, :, 3]
-            for iz in range(nz):
+            for iz in np.nonzero(layers)[0]:
                 z = (lowest[2] + iz) * voxel
                 enough = len(view) if near[ix, iy, iz] else LEAST_FREE
                 count, free = _observed(x, y, z, column, plane, view, projection, truncation, enough, seen)
@@ -86,7 +86,7 @@ def _observed(x, y, z, column, plane, view, projection, truncation, enough, seen
         elif distance > -truncation:
             # Across the ray a pixel is as uncertain as ever, along it by the tangent of the incidence more.
             seen[count, 0], seen[count, 1] = distance, plane[row, 4] ** 2
-            seen[count, 2:] = plane[row, :3]
+            seen[count, 2], seen[count, 3], seen[count, 4] = plane[row, 0], plane[row, 1], plane[row, 2]
             count += 1
     return count, free
 

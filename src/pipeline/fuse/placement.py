@@ -68,7 +68,8 @@ def find(views: Views, name: str, rng: np.random.Generator) -> tuple[Plane, Plac
     both objects when there are two.
     """
     points, middle = table.world_points(views), table.focus(views)
-    near = points.only(np.linalg.norm(points.places_m - middle, axis=1) < table.NEAR_M)
+    x, y, z = (points.places_m - middle).T
+    near = points.only(x * x + y * y + z * z < table.NEAR_M**2)
     eyes = np.array([T[:3, 3] for T in views.T_world_cameras])
     failures: list[NoObject] = []
     for plane in table.planes(near.places_m, eyes, name, rng):
@@ -164,14 +165,12 @@ def _platter_m(placement: Placement) -> float | None:
 
 def _locally(points: Points, plane: Plane, placement: Placement, eyes: np.ndarray, on_it: bool) -> Plane:
     """Return the plane fitted again to the table around the object, or to the base that it stands on."""
+    x, y, _ = frames.apply(placement.T_object_world, points.places_m).T
+    own = placement.covers(x, y)
     if on_it:
-        places = frames.apply(placement.T_object_world, points.places_m)
-        own = placement.covers(places[:, 0], places[:, 1])
         return table.refined(points.places_m[own], plane.normal, plane.offset_m, eyes)
-    places = frames.apply(placement.T_object_world, points.places_m)
-    low, high = placement.bounds_m[0, :2] - AROUND_M, placement.bounds_m[1, :2] + AROUND_M
-    around = ((places[:, :2] > low) & (places[:, :2] < high)).all(axis=1)
-    around &= ~placement.covers(places[:, 0], places[:, 1])
+    low, high = placement.bounds_m[0] - AROUND_M, placement.bounds_m[1] + AROUND_M
+    around = (x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1]) & ~own
     if np.count_nonzero(around) < LEAST_POINTS:
         return plane
     return table.refined(points.places_m[around], plane.normal, plane.offset_m, eyes)

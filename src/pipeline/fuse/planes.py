@@ -76,6 +76,7 @@ def _window(
 def _fitted(depth, K, T_object_camera, bounds):  # type: ignore[no-untyped-def]
     """Return the planes (H · W, 5) of a window's depths (H, W)."""
     height, width = depth.shape
+    weights = _weights()
     out = np.zeros((height * width, 5), np.float32)
     for v in range(height):
         for u in range(width):
@@ -85,7 +86,7 @@ def _fitted(depth, K, T_object_camera, bounds):  # type: ignore[no-untyped-def]
             x, y = (u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1]
             inverse, along, across = 1.0 / z, 0.0, 0.0
             if _within(x * z, y * z, z, T_object_camera, bounds):
-                inverse, along, across, count = _plane_at(depth, v, u)
+                inverse, along, across, count = _plane_at(depth, weights, v, u)
                 if count < _LEAST_PIXELS:
                     continue
             # On a plane a·x + b·y + c = 1/z, where (x, y, 1) is the ray: its normal is (a, b, c).
@@ -106,16 +107,26 @@ def _within(x, y, z, T, bounds):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _plane_at(depth, v, u):  # type: ignore[no-untyped-def]
-    """Return inverse depth, its two slopes a pixel and the number of pixels: a small fit, then one gated by it."""
-    inverse, along, across, count = _fit(depth, v, u, 1, 2 * GATE_M, 1.0 / depth[v, u], 0.0, 0.0)
-    if count < _LEAST_PIXELS:
-        return inverse, along, across, count
-    return _fit(depth, v, u, RADIUS_PX, GATE_M, inverse, along, across)
+def _weights():  # type: ignore[no-untyped-def]
+    """Return how much neighbours (2 R + 1, 2 R + 1) count, by their distance in pixels."""
+    weights = np.zeros((2 * RADIUS_PX + 1, 2 * RADIUS_PX + 1))
+    for dv in range(-RADIUS_PX, RADIUS_PX + 1):
+        for du in range(-RADIUS_PX, RADIUS_PX + 1):
+            weights[RADIUS_PX + dv, RADIUS_PX + du] = np.exp(-0.5 * (du * du + dv * dv) / SIGMA_PX**2)
+    return weights
 
 
 @numba.njit(cache=True)
-def _fit(depth, v, u, radius, gate, inverse, along, across):  # type: ignore[no-untyped-def]
+def _plane_at(depth, weights, v, u):  # type: ignore[no-untyped-def]
+    """Return inverse depth, its two slopes a pixel and the number of pixels: a small fit, then one gated by it."""
+    inverse, along, across, count = _fit(depth, weights, v, u, 1, 2 * GATE_M, 1.0 / depth[v, u], 0.0, 0.0)
+    if count < _LEAST_PIXELS:
+        return inverse, along, across, count
+    return _fit(depth, weights, v, u, RADIUS_PX, GATE_M, inverse, along, across)
+
+
+@numba.njit(cache=True)
+def _fit(depth, weights, v, u, radius, gate, inverse, along, across):  # type: ignore[no-untyped-def]
     """Fit inverse depth, in which planes are linear, to the pixels whose depth is within `gate` of the plane given."""
     height, width = depth.shape
     w0, wu, wv, wuu, wuv, wvv, wq, wuq, wvq = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -126,7 +137,7 @@ def _fit(depth, v, u, radius, gate, inverse, along, across):  # type: ignore[no-
             expected = inverse + along * du + across * dv
             if depth[j, i] <= 0 or expected <= 0 or abs(depth[j, i] - 1.0 / expected) > gate:
                 continue
-            w, q = np.exp(-0.5 * (du * du + dv * dv) / SIGMA_PX**2), 1.0 / depth[j, i]
+            w, q = weights[RADIUS_PX + dv, RADIUS_PX + du], 1.0 / depth[j, i]
             w0, wu, wv, wq = w0 + w, wu + w * du, wv + w * dv, wq + w * q
             wuu, wuv, wvv = wuu + w * du * du, wuv + w * du * dv, wvv + w * dv * dv
             wuq, wvq = wuq + w * du * q, wvq + w * dv * q

@@ -81,11 +81,13 @@ def smoothed(vertices, start, neighbour, move, rounds, factors):  # type: ignore
     for step in range(rounds * len(factors)):
         factor = factors[step % len(factors)]
         for i in range(len(now)):
+            x, y, z = 0.0, 0.0, 0.0
+            for j in range(start[i], start[i + 1]):
+                near = neighbour[j]
+                x, y, z = x + now[near, 0], y + now[near, 1], z + now[near, 2]
             count = start[i + 1] - start[i]
-            for k in range(3):
-                total = 0.0
-                for j in range(start[i], start[i + 1]):
-                    total += now[neighbour[j], k]
-                after[i, k] = now[i, k] + factor * (total / count - now[i, k]) * move[i, k]
+            after[i, 0] = now[i, 0] + factor * (x / count - now[i, 0]) * move[i, 0]
+            after[i, 1] = now[i, 1] + factor * (y / count - now[i, 1]) * move[i, 1]
+            after[i, 2] = now[i, 2] + factor * (z / count - now[i, 2]) * move[i, 2]
         now, after = after, now
     return now

@@ -106,12 +106,12 @@ def planes(points: np.ndarray, eyes: np.ndarray, name: str, rng: np.random.Gener
         if share < LEAST_SHARE:
             break
         plane = refined(left, normal, offset, eyes)
-        left = left[np.abs(plane.height(left)) > 2 * INLIER_M]
         under = int(np.count_nonzero(plane.height(eyes) < 0))
         if under <= (1 - LEAST_ABOVE) * len(eyes):
             n_found += 1
             yield plane
         below = below or under
+        left = left[np.abs(plane.height(left)) > 2 * INLIER_M]
     if not n_found and below:
         raise PipelineError(
             f"{name}: expected every camera above the table, found {below} of {len(eyes)} below it; {CURE}"

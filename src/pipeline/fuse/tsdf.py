@@ -23,6 +23,7 @@ EXCESS_VOXELS = 0.8
 EXCESS_RAMP_M = 0.003
 LEAST_VOTES, PRIOR_VOTES, UNSEEN_VOTE = 0.2, 0.5, 0.1
 LEAST_WEIGHT = 0.3  # of the cosines under which pixels saw a vertex, for it to count as seen: one view at 70°
+_AROUND = 2  # voxels around one, to which its value is drawn
 _LEAST_VALUE = 0.02  # of the truncation: keeps vertices apart from grid points, so that no triangle is empty
 
 
@@ -93,7 +94,8 @@ def _field(
     near = _near(points_m, lowest, covered, truncation_m, voxel_m)
     arrays = seen_by.plane, seen_by.view, seen_by.projection
     columns = covered.any(axis=2)
-    value, weight = measuring.signed_distances(lowest, voxel_m, columns, near, *arrays, truncation_m)
+    layers = ndimage.binary_dilation(covered.any(axis=(0, 1)), iterations=_AROUND)
+    value, weight = measuring.signed_distances(lowest, voxel_m, columns, layers, near, *arrays, truncation_m)
     value = regularised(value, weight)
     value[~covered] = 1.0
     return value
@@ -170,7 +172,7 @@ def regularised(value: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """
 
     def around(field: np.ndarray) -> np.ndarray:
-        return ndimage.gaussian_filter(field.astype(np.float32), 1.0, truncate=2.0, mode="constant")
+        return ndimage.gaussian_filter(field.astype(np.float32), 1.0, radius=_AROUND, mode="constant")
 
     measured = weight > 0
     mean = around(np.where(measured, value, -UNSEEN_VOTE)) / around(np.where(measured, 1.0, UNSEEN_VOTE))

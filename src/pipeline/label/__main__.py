@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from pipeline import command
-from pipeline.artefacts import points, read_json, read_table, write_table
+from pipeline.artefacts import points, read_columns, read_json, write_table
 
 
 def main() -> None:
@@ -26,7 +26,7 @@ def main() -> None:
     from pipeline.label.classifier import PARTS, PartClassifier
     from pipeline.label.features import neighbourhood_features
 
-    cloud = read_table(options.cloud, "cloud")
+    cloud = read_columns(options.cloud, "cloud")
     if options.cloud == options.source_cloud:
         parts = source_parts(options.annotation, options.source_fusion, points(cloud))
         probabilities = parts.astype(float)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline import command
-from pipeline.artefacts import points, read_table, write_json
+from pipeline.artefacts import points, read_columns, write_json
 from pipeline.label.annotation import source_parts
 from pipeline.label.classifier import train
 from pipeline.label.features import neighbourhood_features
@@ -24,7 +24,7 @@ def main() -> None:
     )
     options = parser.parse_args()
 
-    source_m = points(read_table(options.source_cloud, "cloud"))
+    source_m = points(read_columns(options.source_cloud, "cloud"))
     parts = source_parts(options.annotation, options.source_fusion, source_m)
     learnt = train(neighbourhood_features(source_m, options.neighbours), np.asarray(parts), options.ridge)
     numbers = {"weights": learnt.weights.tolist(), "offsets": learnt.offsets.tolist()}

@@ -1,10 +1,11 @@
 """Read the warped parameters of an object off its warped clouds."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipeline import command
-from pipeline.artefacts import points, read_table, write_table
+from pipeline.artefacts import points, read_columns, write_table
+from pipeline.columns import Columns
 from pipeline.errors import PipelineError
 
 # The paper's, and the capacity: what later stages use.
@@ -13,9 +14,6 @@ PAPER = (
     "capacity_m3",
 )
 ALONG_RIM = ("x_m", "y_m", "z_m", "tilt_reference_rad")
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 def main() -> None:
@@ -32,13 +30,14 @@ def main() -> None:
     )
     options = parser.parse_args()
 
-    import pandas as pd
+    import numpy as np
 
     mappings = {
-        "point_mapping": read_table(options.point_mapping, "mapping"),
-        "label_mapping": read_table(options.label_mapping, "mapping"),
+        "point_mapping": read_columns(options.point_mapping, "mapping"),
+        "label_mapping": read_columns(options.label_mapping, "mapping"),
     }
     centre_m = points(mappings["label_mapping"]).mean(axis=0)
+    centre = dict(zip(("centre_x_m", "centre_y_m", "centre_z_m"), centre_m, strict=True))
     rows, references = [], []
     for mapping, table in mappings.items():
         head = {"object": options.object, "mapping": mapping}
@@ -48,14 +47,16 @@ def main() -> None:
             if not options.allow_missing:
                 raise
             values, along_rim = _nothing()
-        rows.append({**head, **values})
-        references.append(pd.DataFrame({**along_rim, **head}))
-    centre = dict(zip(("centre_x_m", "centre_y_m", "centre_z_m"), centre_m, strict=True))
-    write_table(options.parameters, pd.DataFrame(rows).assign(**centre), "parameters")
-    write_table(options.tilt_references, pd.concat(references), "tilt_references")
+        rows.append({**head, **values, **centre})
+        words = {name: [word] * len(along_rim["x_m"]) for name, word in head.items()}
+        references.append({**along_rim, **words})
+    parameters = {column: [row[column] for row in rows] for column in rows[0]}
+    write_table(options.parameters, parameters, "parameters")
+    together = {column: np.concatenate([some[column] for some in references]) for column in references[0]}
+    write_table(options.tilt_references, together, "tilt_references")
 
 
-def _read_off(table: "pd.DataFrame", name: str, hull_points: int) -> tuple[dict[str, float], dict[str, Any]]:
+def _read_off(table: Columns, name: str, hull_points: int) -> tuple[dict[str, float], dict[str, Any]]:
     """Return the parameters of a mapping, and the columns of the tilt references along its rim."""
     from pipeline.parametrise import cloud
     from pipeline.parametrise.parameters import evaluate, numbers

@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
-from pipeline.artefacts import normals, points
+from pipeline.artefacts import Frame, normals, points
 from pipeline.errors import PipelineError
 
 # What `evaluate` starts from: all points (N, 3) with their areas; those of the container with normals and areas, and evened;
@@ -50,11 +49,11 @@ class Cloud:
         }
 
 
-def warped(table: pd.DataFrame, *, name: str) -> Cloud:
+def warped(table: Frame, *, name: str) -> Cloud:
     """Return the valid points of a table `mapping`; a `PipelineError` names the object if they lack a container or a rim."""
-    table = table[table["valid"]]
-    points_m, directions = points(table), normals(table)
-    container, rim = table["container"].to_numpy(bool), table["rim"].to_numpy(bool)
+    valid = np.asarray(table["valid"], bool)
+    points_m, directions = points(table)[valid], normals(table)[valid]
+    container, rim, area_m2 = (np.asarray(table[column])[valid] for column in ("container", "rim", "area_m2"))
     if min(container.sum(), rim.sum()) < _LEAST:
         raise PipelineError(
             f"{name}: expected a container and a rim after warping, found {container.sum()} and {rim.sum()} points; "
@@ -64,7 +63,7 @@ def warped(table: pd.DataFrame, *, name: str) -> Cloud:
     outside = container.copy()
     outside[container] = _outward(points_m[container], directions[container])
     even_m[outside] = evened(points_m[outside], directions[outside])
-    return Cloud(points_m, directions, table["area_m2"].to_numpy(float), container, rim, even_m)
+    return Cloud(points_m, directions, area_m2, container, rim, even_m)
 
 
 def _outward(points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:

@@ -181,7 +181,8 @@ def true_parts(cloud: pd.DataFrame, truth: Truth) -> np.ndarray:
 def label_scores(labels: pd.DataFrame, parts: np.ndarray) -> dict[str, float]:
     """Return IoU and balanced accuracy of each part that has two classes on this object, and the baseline's.
 
-    The baseline calls every point container and nothing else.
+    The baseline calls every point container and nothing else. The object's own balanced accuracy is the mean of rim and handle:
+    what is container is what is no handle, and would count twice.
     """
     scores: dict[str, float] = {}
     for column, part in enumerate(PARTS):
@@ -192,6 +193,9 @@ def label_scores(labels: pd.DataFrame, parts: np.ndarray) -> dict[str, float]:
         scores[f"{part}.iou"], scores[f"{part}.baseline_iou"] = _iou(found, true), _iou(baseline, true)
         scores[f"{part}.balanced_accuracy"] = _balanced_accuracy(found, true)
         scores[f"{part}.baseline_balanced_accuracy"] = _balanced_accuracy(baseline, true)
+    for kind in ("balanced_accuracy", "baseline_balanced_accuracy"):
+        of_parts = [scores[key] for part in ("rim", "handle") if (key := f"{part}.{kind}") in scores]
+        scores[kind] = sum(of_parts) / len(of_parts)
     return scores
 
 

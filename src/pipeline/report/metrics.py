@@ -80,15 +80,6 @@ def _headlines(found: dict[str, list[float]]) -> Metrics:
             metrics[key.replace("warp_label_mapping", "warp.label_mapping")] = mean
     sides = [value for side in ("inner", "outer") for value in found[f"fuse.{side}_error_mm_mean"]]
     metrics["fuse.surface_error_mm_mean"] = sum(sides) / len(sides)
-    for stage in ("label", "warp.label_mapping"):
-        for kind in ("balanced_accuracy", "baseline_balanced_accuracy"):
-            parts = [
-                metrics[f"{stage}.{part}.{kind}"]
-                for part in ("rim", "handle")
-                if f"{stage}.{part}.{kind}" in metrics
-            ]
-            if parts:
-                metrics[f"{stage}.{kind}"] = sum(parts) / len(parts)
     return metrics
 
 

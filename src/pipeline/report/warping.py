@@ -59,15 +59,12 @@ def scores(processed: Path, source: str, target: str, by: str, truth: "Truth") -
     if not row.isna().any():
         errors = parameter_errors(row, pd.Series(dtype=float), truth)
     own = alignment["label_mapping"]
-    accuracies = [
-        labels[f"{part}.balanced_accuracy"] for part in ("rim", "handle") if f"{part}.iou" in labels
-    ]
     return {
         "residual_mm": 1e3 * own["residual_m"],
         "share_without_candidate": own["share_without_candidate"],
         "wall_side_flips": own["wall_side_flips"],
         "wall_side_flips_without_check": alignment["wall_side_flips_without_check"],
-        "balanced_accuracy": sum(accuracies) / len(accuracies),
+        "balanced_accuracy": labels["balanced_accuracy"],
         "rim_iou": labels["rim.iou"],
         "handle_iou": labels.get("handle.iou", math.nan),
         **{key: abs(errors.get(key, math.nan)) for key in PARAMETERS},

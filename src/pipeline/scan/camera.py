@@ -1,6 +1,7 @@
 """A virtual depth camera like the Kinect: rays into a scene, with the sensor's steps, noise and lost pixels."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -72,17 +73,22 @@ class Scene:
         """Return depth (H, W) in metres (inf where nothing is hit) and the angle of incidence (H, W) of every pixel."""
         from pipeline.geometry.open3d_core import open3d as o3d
 
-        v, u = np.mgrid[:HEIGHT, :WIDTH].astype(float)
-        K = intrinsics()
-        directions = np.stack([(u - K[0, 2]) / FOCAL_PX, (v - K[1, 2]) / FOCAL_PX, np.ones_like(u)], axis=-1)
-        rays = np.zeros((HEIGHT, WIDTH, 6), np.float32)
-        rays[..., :3], rays[..., 3:] = T_world_camera[:3, 3], frames.rotate(T_world_camera, directions)
+        rays_camera, length = _rays()
+        rays = np.empty((HEIGHT, WIDTH, 6), np.float32)
+        rays[..., :3], rays[..., 3:] = T_world_camera[:3, 3], frames.rotate(T_world_camera, rays_camera)
         hits = self._scene.cast_rays(o3d.core.Tensor.from_numpy(rays))
         normals = hits["primitive_normals"].numpy()
-        cosine = np.abs(np.einsum("hwi,hwi->hw", normals, rays[..., 3:])) / np.linalg.norm(
-            directions, axis=-1
-        )
+        cosine = np.abs(np.einsum("hwi,hwi->hw", normals, rays[..., 3:])) / length
         return hits["t_hit"].numpy().astype(float), np.arccos(np.clip(cosine, 0, 1))
+
+
+@cache
+def _rays() -> tuple[np.ndarray, np.ndarray]:
+    """Return the ray through each pixel (H, W, 3), camera frame, of depth 1, and its length (H, W)."""
+    v, u = np.mgrid[:HEIGHT, :WIDTH].astype(float)
+    K = intrinsics()
+    rays = np.stack([(u - K[0, 2]) / FOCAL_PX, (v - K[1, 2]) / FOCAL_PX, np.ones_like(u)], axis=-1)
+    return rays, np.linalg.norm(rays, axis=-1)
 
 
 def depth_image(
@@ -92,7 +98,7 @@ def depth_image(
     depth, incidence = scene.cast(T_world_camera)
     edge = _at_edge(np.where(np.isfinite(depth), depth, 10.0))
     place = _displaced(edge, LATERAL_PX * noise.scale, rng)
-    depth, incidence = depth[place], incidence[place]
+    depth[edge], incidence[edge] = depth[place], incidence[place]
     lost = ~np.isfinite(depth) | (incidence > GRAZING_RAD) | (edge & (rng.random(depth.shape) < EDGE_LOSS))
     depth = np.where(lost, 1.0, depth)
     measured = depth + noise.axial_m(depth, incidence) * rng.standard_normal(depth.shape)
@@ -102,9 +108,9 @@ def depth_image(
 
 
 def _displaced(edge: np.ndarray, sigma_px: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Return the pixel (v, u) that each pixel shows: itself, or near edges one a random step away."""
-    shift = np.where(edge, np.round(sigma_px * rng.standard_normal((2, *edge.shape))), 0).astype(int)
-    v, u = np.mgrid[:HEIGHT, :WIDTH] + shift
+    """Return the pixels (v, u), N each, that the N pixels near edges (H, W) show instead: those a random step away."""
+    shift = np.round(sigma_px * rng.standard_normal((2, *edge.shape))[:, edge]).astype(int)
+    v, u = np.nonzero(edge) + shift
     return np.clip(v, 0, HEIGHT - 1), np.clip(u, 0, WIDTH - 1)
 
 

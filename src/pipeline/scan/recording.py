@@ -68,7 +68,7 @@ def write(folder: Path, recorded: list[tuple[np.ndarray, np.ndarray]]) -> None:
         old.unlink()
     for i, (depth_mm, T_world_camera) in enumerate(recorded):
         with replacing(folder / f"frame-{i:06d}.depth.png") as path:
-            Image.fromarray(depth_mm).save(path, compress_level=3)
+            Image.fromarray(depth_mm).save(path, compress_level=1)
         with replacing(folder / f"frame-{i:06d}.pose.txt") as path:
             np.savetxt(path, T_world_camera, fmt="%.12g")
     with replacing(folder / "camera-intrinsics.txt") as path:

@@ -6,14 +6,15 @@ from typing import TYPE_CHECKING
 from zlib import crc32
 
 from pipeline import command
-from pipeline.artefacts import normals, points, read_table, write_json, write_table
+from pipeline.artefacts import normals, points, read_columns, write_json, write_table
 from pipeline.errors import PipelineError
 
 if TYPE_CHECKING:
-    import pandas as pd
-
+    from pipeline.columns import Columns
     from pipeline.warp.clouds import Cloud, Mapped
     from pipeline.warp.warp import Warp
+
+PARTS = ("container", "rim", "handle")
 
 
 def main() -> None:
@@ -77,28 +78,26 @@ def _fit(options) -> "tuple[Warp, float]":  # type: ignore[no-untyped-def]
 
 
 def _cloud(path: Path) -> "Cloud":
+    import numpy as np
+
     from pipeline.warp.clouds import Cloud
 
-    table = read_table(path, "labels")
-    parts = table[["container", "rim", "handle"]].to_numpy(bool)
-    return Cloud(path.parent.name, points(table), normals(table), table["area_m2"].to_numpy(), parts)
+    table = read_columns(path, "labels")
+    parts = np.column_stack([table[part] for part in PARTS])
+    return Cloud(path.parent.name, points(table), normals(table), table["area_m2"], parts)
 
 
-def _table(mapped: "Mapped") -> "pd.DataFrame":
-    import pandas as pd
-
+def _table(mapped: "Mapped") -> "Columns":
     cloud = mapped.cloud
-    return pd.DataFrame(
-        {
-            **dict(zip(("x_m", "y_m", "z_m"), cloud.points_m.T, strict=True)),
-            **dict(zip(("nx", "ny", "nz"), cloud.normals.T, strict=True)),
-            "area_m2": cloud.area_m2,
-            **dict(zip(("container", "rim", "handle"), cloud.parts.T, strict=True)),
-            "source_index": mapped.source_index,
-            "target_index": mapped.target_index,
-            "valid": mapped.valid,
-        }
-    )
+    return {
+        **dict(zip(("x_m", "y_m", "z_m"), cloud.points_m.T, strict=True)),
+        **dict(zip(("nx", "ny", "nz"), cloud.normals.T, strict=True)),
+        "area_m2": cloud.area_m2,
+        **dict(zip(PARTS, cloud.parts.T, strict=True)),
+        "source_index": mapped.source_index,
+        "target_index": mapped.target_index,
+        "valid": mapped.valid,
+    }
 
 
 def _alignment(warp: "Warp", mapped: "dict[str, Mapped]") -> dict:

@@ -77,7 +77,7 @@ def _rim_ring(cloud: Cloud) -> np.ndarray:
 
     Edges of a base look like rims to local features; but across a base there is a surface.
     """
-    pieces = [cloud.points_m[rows] for rows in components(cloud.points_m, cloud.parts[:, 1])]
+    pieces = [cloud.points_m[rows] for rows in components(cloud, cloud.parts[:, 1])]
     rings = [ring for ring in pieces if len(ring) >= 30]
     scores = [_ring_score(cloud.points_m, ring) for ring in rings]
     if not scores or max(scores) <= 0.0:

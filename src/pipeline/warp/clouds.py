@@ -1,8 +1,10 @@
 """The clouds that a warp joins."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 ARRAYS = ("points_m", "normals", "area_m2", "parts")
 
@@ -19,6 +21,11 @@ class Cloud:
     normals: np.ndarray
     area_m2: np.ndarray
     parts: np.ndarray
+
+    @cached_property
+    def link_m(self) -> float:
+        """Over what distance points are linked to one piece: twice that to a sixth neighbour."""
+        return 2.0 * float(np.median(cKDTree(self.points_m).query(self.points_m, k=[7])[0]))
 
 
 @dataclass(frozen=True)

@@ -99,8 +99,8 @@ class Kernels(Deformation):
         if self.width_m:
             slope = -kernel(points_m, self.centres_m, self.width_m) / self.width_m**2
         else:
-            distance = -kernel(points_m, self.centres_m, 0.0)
-            slope = -np.divide(1.0, distance, out=np.zeros_like(distance), where=distance > 0.0)
+            slope = kernel(points_m, self.centres_m, 0.0)
+            np.divide(1.0, slope, out=slope, where=slope < 0.0)
         # Σ wₖ slopeₖ (x − cₖ)ᵀ as two sums over the centres, which are products of matrices.
         moments = (self.weights[:, :, None] * self.centres_m[:, None]).reshape(-1, 9)
         towards = (slope @ self.weights)[:, :, None] * points_m[:, None]
@@ -113,7 +113,8 @@ def kernel(points_m: np.ndarray, centres_m: np.ndarray, width_m: float) -> np.nd
 
     if width_m:
         return np.exp(-cdist(points_m, centres_m, "sqeuclidean") / (2.0 * width_m**2))
-    return -cdist(points_m, centres_m)
+    distance_m = cdist(points_m, centres_m)
+    return np.negative(distance_m, out=distance_m)
 
 
 @dataclass(frozen=True)

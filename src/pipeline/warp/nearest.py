@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-FETCH = 16
+FETCH = 2
 
 
 def agreeing_neighbours(

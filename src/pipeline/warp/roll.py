@@ -52,7 +52,7 @@ def _handles(cloud: Cloud, origin_m: np.ndarray, ring_m: np.ndarray) -> list[np.
 
     A candidate must stand off the body. A spout does, too: it reaches the rim, and nothing of it faces the body from outside.
     """
-    pieces = components(cloud.points_m, cloud.parts[:, 2])
+    pieces = components(cloud, cloud.parts[:, 2])
     pieces = [rows for rows in pieces if len(rows) >= HANDLE_MIN_SHARE * len(cloud.points_m)]
     if not pieces:
         return []
@@ -90,9 +90,9 @@ def _outside_wall(cloud: Cloud, rows: np.ndarray, origin_m: np.ndarray, outward:
     start_m = cloud.points_m[rows]
     to_axis_m = (origin_m - start_m) * [1.0, 1.0, 0.0]
     way_m = start_m[:, None] + WAY[:, None] * to_axis_m[:, None]
-    distance_m, _ = cKDTree(cloud.points_m[wall]).query(way_m)
     reach_m = 1.5 * np.sqrt(np.median(cloud.area_m2))
-    return (outward[rows] < -0.5) & (distance_m < reach_m).any(axis=1)
+    distance_m, _ = cKDTree(cloud.points_m[wall]).query(way_m, distance_upper_bound=reach_m)
+    return (outward[rows] < -0.5) & np.isfinite(distance_m).any(axis=1)
 
 
 def outline(ring_m: np.ndarray) -> tuple[float, int]:

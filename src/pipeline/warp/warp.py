@@ -56,13 +56,12 @@ class Warp:
 
     @cached_property
     def _pairs(self) -> tuple[np.ndarray, np.ndarray]:
-        index, distance_m = point_pairs(self, 1)
-        return index[:, 0], distance_m[:, 0]
+        return point_pairs(self, 1)
 
     @property
     def target_index(self) -> np.ndarray:
         """Rows (N,) of the target's points that the source's go to; −1 where `valid` is not."""
-        return self._pairs[0]
+        return self._pairs[0][:, 0]
 
     @property
     def valid(self) -> np.ndarray:
@@ -72,7 +71,7 @@ class Warp:
     @property
     def cost_m(self) -> float:
         """Root mean squared distance of the paired points, in metres; inf without any pair."""
-        distance_m = self._pairs[1][self.valid]
+        distance_m = self._pairs[1][self.valid, 0]
         return float(np.sqrt(np.mean(distance_m**2))) if len(distance_m) else float("inf")
 
     def map_points(self, points_m: np.ndarray) -> np.ndarray:
@@ -102,7 +101,7 @@ class Warp:
         The paper's point mapping.
         """
         target, aligned = self.target, self.aligned
-        index, distance = point_pairs(self, k)
+        index, distance = self._pairs if k == 1 else point_pairs(self, k)
         normals = mean_of_neighbours(target.normals, index)
         normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
         points_m = mean_of_neighbours(target.points_m, index)
