@@ -28,6 +28,8 @@ EDGE_M, SURE_EDGE_M = (
 )  # to either side of a pixel: to choose a turn, and to say that it can be told
 FIRST_STEEPNESS = 0.85  # sine of the elevation of the view that the others are fitted to
 TOLD = 0.03  # of the points must contradict a wrong turn
+AS_GOOD = 0.01  # turns that so few points more contradict may as well be right
+APART = 0.05  # one less the cosine between directions, of cameras that show something else
 SAME_CAMERA = 0.02  # of its height in metres and the sines of its tilt
 GOLDEN = 0.381966  # of a whole turn
 ALONG = 0.1  # weight of distances along the surface
@@ -109,7 +111,8 @@ def _placed(stood: list[Levelled], views: Views, rng: np.random.Generator) -> tu
             Evidence(views.depths_m, images, views.intrinsics, witnesses, contrasts)
             for images in (near, sure)
         )
-        pose, told[k] = _best(stood[k], known, model, evidence, certain, rng)
+        eyes = np.stack([(poses[j] @ stood[j].T_level_camera)[:3, 3] for j in others])
+        pose, told[k] = _best(stood[k], known, model, evidence, certain, eyes, rng)
         poses = [*poses[:k], pose, *poses[k + 1 :]]
     return poses, float(np.median(told[1:]))
 
@@ -137,11 +140,13 @@ def _best(
     model: np.ndarray,
     evidence: Evidence,
     sure: Evidence,
+    eyes: np.ndarray,
     rng: np.random.Generator,
 ) -> tuple[np.ndarray, float]:
     """Return T_world_level that fits a view best to the model (M, 7), and how well the evidence tells turns apart.
 
-    What counts is what contradicts: parts that only one of them saw are no evidence.
+    What counts is what contradicts: parts that only one of them saw are no evidence. Of turns that are as good, such as the
+    quarter turns of a square, it is the one that looks from where the fewest of the other cameras (N, 3) do.
     """
     coarse, fine = (_some(view, n, rng) for n in (COARSE, FINE))
     probe = model[rng.integers(len(model), size=MODEL)]
@@ -151,8 +156,16 @@ def _best(
     starts = [turned[i] for i in sorted(np.nonzero(lower)[0], key=lambda i: costs[i])[:REFINED]]
     tree = cKDTree(model)
     ends = [_icp(fine, T, tree, ITERATIONS) for T in (starts if known is None else [_turn(known)])]
-    best = min(ends, key=lambda T: evidence.against(fine, T, probe) + MISFIT * _misfit(fine, T, tree))
+    against = [evidence.against(fine, T, probe) + MISFIT * _misfit(fine, T, tree) for T in ends]
+    as_good = [T for T, cost in zip(ends, against, strict=True) if cost <= min(against) + AS_GOOD]
+    best = min(as_good, key=lambda T: _crowded((T @ view.T_level_camera)[:3, 3], eyes))
     return best, float(np.ptp([sure.against(coarse, T, probe) for T in turned]))
+
+
+def _crowded(eye: np.ndarray, others: np.ndarray) -> float:
+    """Return how many of the other cameras (N, 3) look from about the direction of a camera (3,)."""
+    cosine = others @ eye / (np.linalg.norm(others, axis=1) * np.linalg.norm(eye))
+    return float(np.exp((cosine - 1.0) / APART).sum())
 
 
 def _some(view: Levelled, n: int, rng: np.random.Generator) -> Levelled:
