@@ -46,7 +46,7 @@ def commands(processed: Path, config: dict, source: str, name: str, out: Path) -
         "--hull-points",
         config["parametrise"]["hull_points"],
     ]
-    start = "import numpy, pandas, pyarrow.parquet, scipy.spatial, pipeline.artefacts"
+    start = "import numpy, scipy.spatial, pipeline.artefacts"
     return {
         "start-up": [sys.executable, "-c", start],
         "label": [sys.executable, "-m", "pipeline.label", *map(str, label_call)],

@@ -50,6 +50,20 @@ def test_parts_of_other_objects_are_found_from_the_source_alone():
     assert np.mean(list(rim.values())) > 0.9, rim
 
 
+def test_features_are_those_of_each_point_s_own_neighbours():
+    points_m = points(sampled("jug"))
+    found = neighbourhood_features(points_m, NEIGHBOURS)
+    tree = cKDTree(points_m)
+    for row in range(0, len(points_m), 97):
+        expected = []
+        for k in NEIGHBOURS:
+            distance_m, near = tree.query(points_m[row], k=k)
+            around_m = points_m[near] - points_m[row]
+            spread = np.sqrt(np.linalg.eigvalsh(np.cov(around_m.T, bias=True))[::-1])
+            expected += [*spread / distance_m[-1], np.linalg.norm(around_m.mean(axis=0)) / distance_m[-1]]
+        np.testing.assert_allclose(found[row], expected, rtol=1e-9, atol=1e-12)
+
+
 def test_a_part_that_the_source_lacks_is_never_found():
     parts = sampled("short_cup")[PARTS].to_numpy()
     assert (train(features("short_cup"), parts, 300.0).probabilities(features("mug"))[:, 2] == 0.0).all()

@@ -16,8 +16,9 @@ from pipeline.fuse import placement, tsdf
 from pipeline.fuse.evidence import Evidence, nearest
 from pipeline.fuse.levelled import NORMAL_M, Levelled, axis_of, level
 from pipeline.fuse.raw import Views
+from pipeline.fuse.smoothing import vertex_normals
+from pipeline.fuse.together import ALIKE, HOLD, ROBUST_M, fitted_together, motions, moved
 from pipeline.geometry import frames
-from pipeline.geometry.surface import Surface
 
 TURNS, REFINED = 72, 6
 CAP_M = 0.010  # a point further than this from all others fits nothing
@@ -27,17 +28,17 @@ EDGE_M, SURE_EDGE_M = (
 )  # to either side of a pixel: to choose a turn, and to say that it can be told
 FIRST_STEEPNESS = 0.85  # sine of the elevation of the view that the others are fitted to
 TOLD = 0.03  # of the points must contradict a wrong turn
+AS_GOOD = 0.01  # turns that so few points more contradict may as well be right
+APART = 0.05  # one less the cosine between directions, of cameras that show something else
 SAME_CAMERA = 0.02  # of its height in metres and the sines of its tilt
 GOLDEN = 0.381966  # of a whole turn
 ALONG = 0.1  # weight of distances along the surface
-ALIKE = 0.5  # cosine between normals of points that are the same
-ROBUST_M = 0.002  # residuals beyond count less
 TURNS_BY_COLOUR_RAD = (0.04, 0.02, 0.01)
 COARSE, FINE, MODEL, MOST_MODEL = 300, 1200, 1500, 15_000  # points
-ITERATIONS, SWEEPS = 12, 10
+ITERATIONS = 12
 LEAST_VIEWS = 6
 WITNESSES = 8  # views that are asked whether they look through another's points
-VOXEL_M, ROUNDS, STEPS, NEAR_M = 0.002, 5, 4, 0.006  # of the fit to the fused surface
+VOXEL_M, ROUNDS = 0.002, 3  # of the fit to the fused surface
 MISFIT = 0.03  # weight of distances beside that of contradictions
 MOST_LEFT_OUT = 0.2
 
@@ -55,10 +56,9 @@ def registered(views: Views, name: str, rng: np.random.Generator) -> tuple[Views
         )
     stood, left_out = _levelled(views, name, rng)
     poses, told = _placed(stood, views, rng)
-    poses = _swept(stood, poses, rng)
     if told < TOLD:
         poses = _all_round(stood, poses)
-    poses = fitted_to_surface(stood, poses, views, name, rng)
+    poses = _fitted_to_surface(stood, poses, views, name, rng)
     facts = {"views_without_object": left_out, "roll_observable": told >= TOLD, "roll_evidence": told}
     return _with(views, stood, poses), facts
 
@@ -111,7 +111,8 @@ def _placed(stood: list[Levelled], views: Views, rng: np.random.Generator) -> tu
             Evidence(views.depths_m, images, views.intrinsics, witnesses, contrasts)
             for images in (near, sure)
         )
-        pose, told[k] = _best(stood[k], known, model, evidence, certain, rng)
+        eyes = np.stack([(poses[j] @ stood[j].T_level_camera)[:3, 3] for j in others])
+        pose, told[k] = _best(stood[k], known, model, evidence, certain, eyes, rng)
         poses = [*poses[:k], pose, *poses[k + 1 :]]
     return poses, float(np.median(told[1:]))
 
@@ -139,11 +140,13 @@ def _best(
     model: np.ndarray,
     evidence: Evidence,
     sure: Evidence,
+    eyes: np.ndarray,
     rng: np.random.Generator,
 ) -> tuple[np.ndarray, float]:
     """Return T_world_level that fits a view best to the model (M, 7), and how well the evidence tells turns apart.
 
-    What counts is what contradicts: parts that only one of them saw are no evidence.
+    What counts is what contradicts: parts that only one of them saw are no evidence. Of turns that are as good, such as the
+    quarter turns of a square, it is the one that looks from where the fewest of the other cameras (N, 3) do.
     """
     coarse, fine = (_some(view, n, rng) for n in (COARSE, FINE))
     probe = model[rng.integers(len(model), size=MODEL)]
@@ -153,8 +156,16 @@ def _best(
     starts = [turned[i] for i in sorted(np.nonzero(lower)[0], key=lambda i: costs[i])[:REFINED]]
     tree = cKDTree(model)
     ends = [_icp(fine, T, tree, ITERATIONS) for T in (starts if known is None else [_turn(known)])]
-    best = min(ends, key=lambda T: evidence.against(fine, T, probe) + MISFIT * _misfit(fine, T, tree))
+    against = [evidence.against(fine, T, probe) + MISFIT * _misfit(fine, T, tree) for T in ends]
+    as_good = [T for T, cost in zip(ends, against, strict=True) if cost <= min(against) + AS_GOOD]
+    best = min(as_good, key=lambda T: _crowded((T @ view.T_level_camera)[:3, 3], eyes))
     return best, float(np.ptp([sure.against(coarse, T, probe) for T in turned]))
+
+
+def _crowded(eye: np.ndarray, others: np.ndarray) -> float:
+    """Return how many of the other cameras (N, 3) look from about the direction of a camera (3,)."""
+    cosine = others @ eye / (np.linalg.norm(others, axis=1) * np.linalg.norm(eye))
+    return float(np.exp((cosine - 1.0) / APART).sum())
 
 
 def _some(view: Levelled, n: int, rng: np.random.Generator) -> Levelled:
@@ -165,7 +176,7 @@ def _some(view: Levelled, n: int, rng: np.random.Generator) -> Levelled:
 
 
 def _turn(angle_rad: float) -> np.ndarray:
-    return frames.transform(frames.rotation_about(np.array([0.0, 0.0, 1.0]), angle_rad), np.zeros(3))
+    return moved(angle_rad, 0.0, 0.0)
 
 
 def _misfit(view: Levelled, T: np.ndarray, tree: cKDTree) -> float:
@@ -183,7 +194,7 @@ def _icp(view: Levelled, T: np.ndarray, tree: cKDTree, iterations: int) -> np.nd
         here, there = features[near], tree.data[index[near]]
         # A handle's left half, seen by one view, is not its right half, seen by another.
         alike = np.einsum("nc,nc->n", here[:, 3:6], there[:, 3:6]) > ALIKE * NORMAL_M**2
-        step = fitting_step(here[alike, :3], there[alike, :3], there[alike, 3:6] / NORMAL_M)
+        step = _fitting_step(here[alike, :3], there[alike, :3], there[alike, 3:6] / NORMAL_M)
         T = step @ T
         if np.abs(step - np.eye(4)).max() < 1e-5:
             break
@@ -200,43 +211,28 @@ def _turned_by_colour(view: Levelled, T: np.ndarray, tree: cKDTree) -> np.ndarra
     return T
 
 
-def fitting_step(here: np.ndarray, there: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def _fitting_step(here: np.ndarray, there: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Return the small turn about z and shift across it that bring points (N, 3) into planes (Chen & Medioni 1991).
 
     The planes pass through `there` (N, 3) with unit normals (N, 3).
     """
     if len(here) < 20:
         return np.eye(4)
-    x, y = here[:, 0], here[:, 1]
-    A = np.column_stack([x * normals[:, 1] - y * normals[:, 0], normals[:, 0], normals[:, 1]])
+    A = motions(here, normals)
     b = np.einsum("nc,nc->n", normals, there - here)
     w = 1 / (1 + (b / ROBUST_M) ** 2)
-    # The small extra weight holds what the pairs do not determine: the turn of a round cup.
-    normal = np.einsum("n,ni,nj->ij", w, A, A) + np.diag([1e-6, 1e-3, 1e-3]) * len(b)
+    normal = np.einsum("n,ni,nj->ij", w, A, A) + np.diag(HOLD) * len(b)
     right = np.einsum("n,ni,n->i", w, A, b)
-    # So do the pairs themselves, a little, for the shift alone: of a rim seen from above no plane stands across.
+    # The pairs hold themselves a little, for the shift alone: of a rim seen from above no plane stands across.
     normal[[1, 2], [1, 2]] += ALONG * w.sum()
     right[1:] += ALONG * np.einsum("n,nc->c", w, (there - here)[:, :2])
-    turn, dx, dy = np.linalg.solve(normal, right)
-    return frames.transform(np.eye(3), np.array([dx, dy, 0.0])) @ _turn(turn)
+    return moved(*np.linalg.solve(normal, right))
 
 
-def _swept(stood: list[Levelled], poses: list[np.ndarray], rng: np.random.Generator) -> list[np.ndarray]:
-    """Return the poses after every view was fitted to those of the other half, again and again."""
-    poses = list(poses)
-    fine = [_some(view, FINE, rng) for view in stood]
-    for sweep in range(2 * SWEEPS):
-        half = rng.permutation(len(stood)) % 2 == sweep % 2
-        tree = cKDTree(np.concatenate([fine[k].features(poses[k]) for k in np.nonzero(half)[0]]))
-        for k in np.nonzero(~half)[0]:
-            poses[k] = _icp(fine[k], poses[k], tree, 3)
-    return poses
-
-
-def fitted_to_surface(
+def _fitted_to_surface(
     stood: list[Levelled], poses: list[np.ndarray], views: Views, name: str, rng: np.random.Generator
 ) -> list[np.ndarray]:
-    """Return the poses after views were fused and each fitted to the surface, again and again.
+    """Return the poses after views were fused and fitted to the surface, again and again.
 
     The surface is the mean of all views, so its normals and edges are better than those of any one.
     """
@@ -244,18 +240,10 @@ def fitted_to_surface(
         posed = _with(views, stood, poses)
         _, place = placement.find(posed, name, rng)
         surface = tsdf.fuse(posed, place, VOXEL_M, 2 * VOXEL_M, name)
-        seen = surface.seen[surface.triangles].all(axis=1)
-        vertices = frames.apply(frames.inverse(place.T_object_world), surface.vertices_m)
-        fused = Surface(vertices, surface.triangles[seen])
-        for k, view in enumerate(stood):
-            for _ in range(STEPS):
-                here = frames.apply(poses[k], view.points_m)
-                there, normals = fused.nearest(here)
-                facing = frames.rotate(poses[k], view.normals)
-                near = (np.linalg.norm(there - here, axis=1) < NEAR_M) & (
-                    np.einsum("nc,nc->n", facing, normals) > ALIKE
-                )
-                poses[k] = fitting_step(here[near], there[near], normals[near]) @ poses[k]
+        T_world_object = frames.inverse(place.T_object_world)
+        normals = frames.rotate(T_world_object, vertex_normals(surface.vertices_m, surface.triangles, 1))
+        vertices = frames.apply(T_world_object, surface.vertices_m)
+        poses = fitted_together(stood, poses, vertices, surface.triangles, normals)
     return poses
 
 

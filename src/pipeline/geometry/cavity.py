@@ -55,7 +55,7 @@ def cavity(vertices_m: np.ndarray, triangles: np.ndarray, *, name: str, cell_m: 
     surface = Surface(vertices_m, triangles)
     axes = _axes(vertices_m, cell_m)
     centres = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    free = surface.distance_on_grid(centres, cell_m) > cell_m
+    free = surface.free_on_grid(centres, cell_m)
     pool, level = _pool(free, cell_m, name)
     rim, opening = _rim(surface, axes, pool, level, vertices_m[:, 2].max(), cell_m)
     level_m = axes[2][level]

@@ -65,10 +65,18 @@ def tilt_reference_rad(inside_m: np.ndarray, lip_m: np.ndarray, opening_m: np.nd
 
     A point rises above the lip at its own angle, once, so the tilt that raises half of them is the median.
     """
-    return float(np.median(raising_tilt_rad(inside_m, lip_m, opening_m)))
+    return float(_medians(_raising_tilts_rad(inside_m, lip_m[None], opening_m))[0])
 
 
 def tilt_references_rad(inside_m: np.ndarray, lips_m: np.ndarray, opening_m: np.ndarray) -> np.ndarray:
     """Return `tilt_reference_rad` about each of several lips (L, 3), as (L,)."""
     some = np.array_split(lips_m, -(-len(lips_m) // _LIPS))
-    return np.concatenate([np.median(_raising_tilts_rad(inside_m, lips, opening_m), axis=1) for lips in some])
+    return np.concatenate([_medians(_raising_tilts_rad(inside_m, lips, opening_m)) for lips in some])
+
+
+def _medians(values: np.ndarray) -> np.ndarray:
+    """Return the median of each row (L, N), which is reordered: half of the time of NumPy's, which looks for NaN as well."""
+    middle = values.shape[1] // 2
+    values.partition(middle)
+    upper = values[:, middle]
+    return upper if values.shape[1] % 2 else (values[:, :middle].max(axis=1) + upper) / 2.0

@@ -22,12 +22,13 @@ def main() -> None:
 
     import numpy as np
 
-    from pipeline.label.annotation import source_parts
     from pipeline.label.classifier import PARTS, PartClassifier
     from pipeline.label.features import neighbourhood_features
 
     cloud = read_columns(options.cloud, "cloud")
     if options.cloud == options.source_cloud:
+        from pipeline.label.annotation import source_parts
+
         parts = source_parts(options.annotation, options.source_fusion, points(cloud))
         probabilities = parts.astype(float)
     else:

@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-BLOCK = 500  # points whose neighbourhoods are held at a time: more leave the processor's cache
-LEAF = 32  # points of a leaf of the tree, which for hundreds of neighbours may be large
+GROUP = 48  # points whose neighbours are searched for together, at most
+_FIRST, _SECOND = np.triu_indices(3)  # the products of coordinates that a symmetric matrix has
+_SYMMETRIC = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
 
 
 def neighbourhood_features(points_m: np.ndarray, neighbours: Sequence[int]) -> np.ndarray:
@@ -17,19 +17,49 @@ def neighbourhood_features(points_m: np.ndarray, neighbours: Sequence[int]) -> n
     furthest of them. On a uniform cloud of a fixed number of points, k points are a fixed share of the surface: the
     neighbourhoods grow with the object and the features are free of units.
     """
-    tree, found = cKDTree(points_m, leafsize=LEAF), []
-    for some_m in np.array_split(points_m, -(-len(points_m) // BLOCK)):
-        distance, index = tree.query(some_m, k=max(neighbours))
-        around_m = points_m[index] - some_m[:, None]
-        columns = [_features(around_m[:, :k], distance[:, k - 1 : k]) for k in neighbours]
-        found.append(np.hstack(columns))
-    return np.concatenate(found)
+    rows = _groups(points_m, np.arange(len(points_m)))
+    mean, second, radius_m = map(
+        np.concatenate, zip(*(_moments(points_m, some, neighbours) for some in rows), strict=True)
+    )
+    spread = np.sqrt(np.clip(np.linalg.eigvalsh(second)[..., ::-1], 0.0, None))
+    found = (
+        np.concatenate([spread, np.linalg.norm(mean, axis=-1, keepdims=True)], axis=-1) / radius_m[..., None]
+    )
+    features = np.empty((len(points_m), 4 * len(neighbours)))
+    features[np.concatenate(rows)] = found.reshape(len(points_m), -1)
+    return features
 
 
-def _features(around_m: np.ndarray, radius_m: np.ndarray) -> np.ndarray:
-    """Return the features of points whose neighbours (N, k, 3) are given as seen from each."""
-    mean = around_m.mean(axis=1)
-    second = around_m.transpose(0, 2, 1) @ around_m / around_m.shape[1]
-    covariance = second - mean[:, :, None] * mean[:, None]
-    spread = np.sqrt(np.clip(np.linalg.eigvalsh(covariance)[:, ::-1], 0.0, None))
-    return np.hstack([spread, np.linalg.norm(mean, axis=1, keepdims=True)]) / radius_m
+def _groups(points_m: np.ndarray, rows: np.ndarray) -> list[np.ndarray]:
+    """Return rows in groups of points that are near each other: halves of halves along the longest extent."""
+    if len(rows) <= GROUP:
+        return [rows]
+    here_m = points_m[rows]
+    half = len(rows) // 2
+    order = rows[np.argpartition(here_m[:, np.ptp(here_m, axis=0).argmax()], half)]
+    return _groups(points_m, order[:half]) + _groups(points_m, order[half:])
+
+
+def _moments(
+    points_m: np.ndarray, rows: np.ndarray, neighbours: Sequence[int]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return of a group's points the mean (M, K, 3) of their neighbours as seen from each, their covariance (M, K, 3, 3), and
+    the distance (M, K) of the furthest, for each of K numbers of neighbours.
+
+    One search for a whole group takes half of the time of a tree's, which looks for each point's by itself: the nearest of any
+    are within R + 2 r of the group's middle, whose own nearest are within R, where r is how far the group reaches.
+    """
+    ends = np.minimum(neighbours, len(points_m)) - 1
+    offset_m = points_m - points_m[rows].mean(axis=0)
+    distance_m = np.sqrt(np.einsum("nc,nc->n", offset_m, offset_m))
+    within_m = np.partition(distance_m, ends.max())[ends.max()] + 2.0 * distance_m[rows].max()
+    near_m, from_m = offset_m[distance_m <= within_m * (1.0 + 1e-9)], offset_m[rows]
+    square_m2 = np.einsum("nc,nc->n", near_m, near_m) - 2.0 * from_m @ near_m.T
+    square_m2 += np.einsum("nc,nc->n", from_m, from_m)[:, None]
+    furthest_m2 = np.sort(np.partition(square_m2, ends.max(), axis=1)[:, : ends.max() + 1], axis=1)[:, ends]
+    chosen = square_m2[:, None] <= furthest_m2[..., None]
+    terms = np.column_stack([np.ones(len(near_m)), near_m, near_m[:, _FIRST] * near_m[:, _SECOND]])
+    sums = (chosen.reshape(-1, len(near_m)).astype(float) @ terms).reshape(*chosen.shape[:2], -1)
+    mean, second = np.split(sums[..., 1:] / sums[..., :1], [3], axis=-1)
+    covariance = second[..., _SYMMETRIC] - mean[..., :, None] * mean[..., None, :]
+    return mean - from_m[:, None], covariance, np.sqrt(furthest_m2)
