@@ -56,6 +56,12 @@ def turns_deg(scan, truth: np.ndarray, views: range) -> np.ndarray:
     return np.degrees(np.arccos(np.clip((np.trace(apart[:, :3, :3], axis1=1, axis2=2) - 1) / 2, -1, 1)))
 
 
+def shifts_m(scan, truth: np.ndarray) -> np.ndarray:
+    """Return how far (N,) from the middle of all each view shows the object."""
+    found = np.stack(scan.views.T_world_cameras) @ np.linalg.inv(truth) @ T_WORLD_OBJECT
+    return np.linalg.norm(found[:, :2, 3] - np.median(found[:, :2, 3], axis=0), axis=1)
+
+
 def test_paint_tells_the_turns_of_a_round_cup(tmp_path):
     truth = record(tmp_path, "small_cup", painted=True)
     scan = located(tmp_path)
@@ -85,6 +91,8 @@ def test_a_handle_tells_the_turns_of_the_views(tmp_path):
     assert scan.registration["roll_observable"]
     # Lower views, which the cup hides its handle from, have no turn; its two sides are seen by different views.
     assert turns_deg(scan, truth, range(RINGS_DEG[0][1], len(truth))).max() < 4.0
+    # Shifts towards the cameras would make the wall thicker or thinner by twice as much.
+    assert np.median(shifts_m(scan, truth)) < 0.00022
 
 
 def test_a_round_cup_is_said_to_be_round_and_seen_from_all_sides(tmp_path):

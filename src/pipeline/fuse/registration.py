@@ -35,7 +35,7 @@ GOLDEN = 0.381966  # of a whole turn
 ALONG = 0.1  # weight of distances along the surface
 TURNS_BY_COLOUR_RAD = (0.04, 0.02, 0.01)
 COARSE, FINE, MODEL, MOST_MODEL = 300, 1200, 1500, 15_000  # points
-ITERATIONS = 12
+ITERATIONS, SWEEPS = 12, 10
 LEAST_VIEWS = 6
 WITNESSES = 8  # views that are asked whether they look through another's points
 VOXEL_M, ROUNDS = 0.002, 3  # of the fit to the fused surface
@@ -56,6 +56,8 @@ def registered(views: Views, name: str, rng: np.random.Generator) -> tuple[Views
         )
     stood, left_out = _levelled(views, name, rng)
     poses, told = _placed(stood, views, rng)
+    if views.colours:  # which the surface does not have
+        poses = _swept(stood, poses, rng)
     if told < TOLD:
         poses = _all_round(stood, poses)
     poses = _fitted_to_surface(stood, poses, views, name, rng)
@@ -157,7 +159,8 @@ def _best(
     tree = cKDTree(model)
     ends = [_icp(fine, T, tree, ITERATIONS) for T in (starts if known is None else [_turn(known)])]
     against = [evidence.against(fine, T, probe) + MISFIT * _misfit(fine, T, tree) for T in ends]
-    as_good = [T for T, cost in zip(ends, against, strict=True) if cost <= min(against) + AS_GOOD]
+    most = min(against) + (AS_GOOD if view.contrasts is None else 0.0)  # paint tells them apart
+    as_good = [T for T, cost in zip(ends, against, strict=True) if cost <= most]
     best = min(as_good, key=lambda T: _crowded((T @ view.T_level_camera)[:3, 3], eyes))
     return best, float(np.ptp([sure.against(coarse, T, probe) for T in turned]))
 
@@ -227,6 +230,18 @@ def _fitting_step(here: np.ndarray, there: np.ndarray, normals: np.ndarray) -> n
     normal[[1, 2], [1, 2]] += ALONG * w.sum()
     right[1:] += ALONG * np.einsum("n,nc->c", w, (there - here)[:, :2])
     return moved(*np.linalg.solve(normal, right))
+
+
+def _swept(stood: list[Levelled], poses: list[np.ndarray], rng: np.random.Generator) -> list[np.ndarray]:
+    """Return the poses after every view was fitted to those of the other half, again and again."""
+    poses = list(poses)
+    fine = [_some(view, FINE, rng) for view in stood]
+    for sweep in range(2 * SWEEPS):
+        half = rng.permutation(len(stood)) % 2 == sweep % 2
+        tree = cKDTree(np.concatenate([fine[k].features(poses[k]) for k in np.nonzero(half)[0]]))
+        for k in np.nonzero(~half)[0]:
+            poses[k] = _icp(fine[k], poses[k], tree, 3)
+    return poses
 
 
 def _fitted_to_surface(
