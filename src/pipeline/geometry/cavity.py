@@ -107,9 +107,16 @@ def retained_volume_m3(
     steps = np.linspace(
         0.0, max(float(tilts.max(initial=0.0)), 1e-3), max(2, int(tilts.max(initial=0.0) / 0.035) + 2)
     )
-    points, volumes, cell = blocks or quadrature(cup)
-    kept = [_volume_under(points, volumes, cell, cup.rim_m, rotation_about(axis, t)[2]) for t in steps]
+    blocks = blocks or quadrature(cup)
+    kept = [under_rim_m3(cup, axis, t, blocks) for t in steps]
     return np.interp(tilts, steps, np.minimum.accumulate(kept))
+
+
+def under_rim_m3(cup: Cavity, axis: np.ndarray, tilt_rad: float, blocks: Quadrature) -> float:
+    """Return the room below a surface that is level with the rim's lowest point, tilted about `axis`, m³."""
+    points, volumes, cell = blocks
+    up = rotation_about(axis, tilt_rad)[2]
+    return float(volumes @ _share_below((cup.rim_m @ up).min() - points @ up, cell))
 
 
 def room_m3(cup: Cavity) -> np.ndarray:
@@ -133,13 +140,6 @@ def quadrature(cup: Cavity) -> Quadrature:
     index = np.argwhere(volumes > 0)
     points = cup.origin_m + cup.cell_m * (2 * index + 0.5)
     return points, volumes[tuple(index.T)], 2 * cup.cell_m
-
-
-def _volume_under(
-    points: np.ndarray, volumes: np.ndarray, cell: float, rim: np.ndarray, up: np.ndarray
-) -> float:
-    level = (rim @ up).min()
-    return float(volumes @ _share_below(level - points @ up, cell))
 
 
 def _share_below(depth: np.ndarray, cell: float) -> np.ndarray:

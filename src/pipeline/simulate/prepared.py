@@ -11,13 +11,21 @@ from typing import Any
 import numpy as np
 
 from pipeline.command import untold
-from pipeline.geometry.cavity import Cavity, Quadrature, cavity, quadrature, retained_volume_m3
+from pipeline.geometry.cavity import (
+    Cavity,
+    Quadrature,
+    cavity,
+    quadrature,
+    retained_volume_m3,
+    under_rim_m3,
+)
 from pipeline.simulate import liquid
 from pipeline.simulate.containers import decimated, wall_pieces
 from pipeline.simulate.engines import ENGINES, Engine
 from pipeline.simulate.fields import Walls
 
 Arrays = dict[str, np.ndarray]
+_TILTS_RAD = np.linspace(0.0, np.pi, 181)
 
 
 @dataclass(frozen=True)
@@ -34,7 +42,7 @@ class Container:
     pieces: list[np.ndarray]
     vessel: Any
     engine: Engine
-    _kept_m3: dict[tuple[bytes, float], float] = field(default_factory=dict, repr=False, compare=False)
+    _kept_m3: dict[bytes, np.ndarray] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def cavity(self) -> Cavity:
@@ -55,12 +63,16 @@ class Container:
     def _blocks(self) -> Quadrature:
         return quadrature(self.cavity)
 
+    def under_rim_m3(self, axis: np.ndarray, tilt_rad: float) -> float:
+        """Return the room below the rim's lowest point when tilted about `axis` (object frame): no less than what is kept."""
+        return under_rim_m3(self.cavity, axis, tilt_rad, self._blocks)
+
     def kept_m3(self, lip_m: np.ndarray, axis: np.ndarray, tilt_rad: float) -> float:
-        """Return what the cup keeps when tilted slowly about `axis` (object frame); remembered, as lips recur."""
-        key = (lip_m.tobytes(), tilt_rad)
+        """Return what the cup keeps when tilted slowly about `axis` (object frame); a lip's curve is remembered, as lips recur."""
+        key = lip_m.tobytes()
         if key not in self._kept_m3:
-            self._kept_m3[key] = float(retained_volume_m3(self.cavity, lip_m, axis, tilt_rad, self._blocks))
-        return self._kept_m3[key]
+            self._kept_m3[key] = retained_volume_m3(self.cavity, lip_m, axis, _TILTS_RAD, self._blocks)
+        return float(np.interp(tilt_rad, _TILTS_RAD, self._kept_m3[key]))
 
 
 def container(

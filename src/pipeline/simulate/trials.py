@@ -179,8 +179,11 @@ def filling_margin(
     inside = inside_m(rim_world[:, :2], landing[:2]) / draws.opening_radius_m(second.cavity)
     margin = min(inside, (capacity_m3 - draw.second_fill_m3 - held_m3) / capacity_m3)
     axis_held = draw.T_world_held[:3, :3].T @ draw.axis_world
+    least_m3 = 0.5 * held.particle_m3
+    if held.under_rim_m3(axis_held, protocol.tilt_rad) < least_m3:
+        return float(margin)
     kept_m3 = min(held_m3, held.kept_m3(draw.lip_m, axis_held, protocol.tilt_rad))
-    return float(margin if kept_m3 < 0.5 * held.particle_m3 else min(margin, -kept_m3 / held_m3))
+    return float(margin if kept_m3 < least_m3 else min(margin, -kept_m3 / held_m3))
 
 
 def throw_m(depth_m: float, fall_m: float, tilt_rad: float) -> float:
