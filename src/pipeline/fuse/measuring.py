@@ -36,8 +36,13 @@ def signed_distances(lowest, voxel, columns, layers, near, plane, view, projecti
             if not columns[ix, iy]:
                 continue
             x, y = (lowest[0] + ix) * voxel, (lowest[1] + iy) * voxel
-            column[:] = projection[:, :, 0] * x + projection[:, :, 1] * y + projection[:, :, 3]
-            for iz in np.nonzero(layers)[0]:
+            # One number at a time: assigning to a slice compiles numba's text of an error that cannot be, for seconds.
+            for k in range(len(view)):
+                for c in range(3):
+                    column[k, c] = projection[k, c, 0] * x + projection[k, c, 1] * y + projection[k, c, 3]
+            for iz in range(nz):
+                if not layers[iz]:
+                    continue
                 z = (lowest[2] + iz) * voxel
                 enough = len(view) if near[ix, iy, iz] else LEAST_FREE
                 count, free = _observed(x, y, z, column, plane, view, projection, truncation, enough, seen)
@@ -133,11 +138,17 @@ def _main_axis(seen):  # type: ignore[no-untyped-def]
         for i in range(3):
             for j in range(3):
                 scatter[i, j] += seen[k, 1] * seen[k, 2 + i] * seen[k, 2 + j]
-    axis, turned = scatter[np.argmax(np.diag(scatter))].copy(), np.zeros(3)
+    longest = 0
+    for i in range(1, 3):
+        if scatter[i, i] > scatter[longest, longest]:
+            longest = i
+    axis, turned = scatter[longest].copy(), np.zeros(3)
     for _ in range(4):
         for i in range(3):
             turned[i] = scatter[i, 0] * axis[0] + scatter[i, 1] * axis[1] + scatter[i, 2] * axis[2]
-        axis[:] = turned / max(np.sqrt((turned**2).sum()), 1e-300)
+        length = max(np.sqrt(turned[0] ** 2 + turned[1] ** 2 + turned[2] ** 2), 1e-300)
+        for i in range(3):
+            axis[i] = turned[i] / length
     return axis
 
 
