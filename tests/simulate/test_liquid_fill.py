@@ -57,8 +57,17 @@ def test_a_brimful_second_overflows_by_about_what_falls_in(cylinder: Vessel, bow
     assert over.n_leaked == 0
 
 
+@pytest.mark.xfail(
+    reason="`holds` is of the middle one of the states at the brim; a fuller one takes five more"
+)
 def test_more_than_it_holds_is_spilled_while_settling(cylinder: Vessel, bowl: Vessel) -> None:
-    most = max(len(state) for state in rest._brimful(bowl))  # of the states at the brim that a trial may draw
+    assert fill(cylinder, bowl, (0.0, 0.0, 0.02), liquid.holds(bowl) + 5).spilled_while_settling
+
+
+def test_more_than_any_state_at_the_brim_holds_is_spilled_while_settling(
+    cylinder: Vessel, bowl: Vessel
+) -> None:
+    most = max(len(state) for state in rest._brimful(bowl))
     assert fill(cylinder, bowl, (0.0, 0.0, 0.02), most + 5).spilled_while_settling
 
 

@@ -59,7 +59,7 @@ def settle(vessel: Vessel, n: int, seed: int | tuple[int, ...]) -> np.ndarray:
     """
     rng = np.random.default_rng(seed)
     level = next(level for level in _levels() if level >= n)
-    at_rest = _settled(vessel, level) if level <= holds(vessel) else _no_one()
+    at_rest = _settled(vessel, level) if level <= holds(vessel) else np.zeros((0, 3))
     if len(at_rest) < n:  # a level just below the rim can splash over it while it settles
         at_rest = _full(vessel, n, rng)
     lowest = _lowest(at_rest, n)
@@ -82,7 +82,7 @@ def _levels() -> Iterator[int]:
 
 
 def holds(vessel: Vessel) -> int:
-    """Return how many particles stay for good when the vessel is filled gently until it overflows."""
+    """Return how many particles stay for good when the vessel is filled gently until it overflows, in its middle state."""
     return len(_brimful(vessel)[0])
 
 
@@ -146,10 +146,6 @@ def _made_once(vessel: Vessel, first: int, make: Callable[[], list[np.ndarray]])
     if first not in vessel.settled:
         vessel.settled.update(zip(keys, make(), strict=True))
     return [vessel.settled[key] for key in keys]
-
-
-def _no_one() -> np.ndarray:
-    return np.zeros((0, 3))
 
 
 def _lowest(at_rest: np.ndarray, n: int) -> np.ndarray:
