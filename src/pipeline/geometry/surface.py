@@ -22,12 +22,6 @@ class Surface:
         points = self._tensor(np.ascontiguousarray(points_m, np.float32))
         return self._scene.compute_distance(points, nthreads=1).numpy().astype(float)
 
-    def nearest(self, points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the nearest point of the surface to each point, and the unit normal there."""
-        points = self._tensor(np.ascontiguousarray(points_m, np.float32))
-        found = self._scene.compute_closest_points(points, nthreads=1)
-        return found["points"].numpy().astype(float), found["primitive_normals"].numpy().astype(float)
-
     def distance_on_grid(self, centres_m: np.ndarray, cell_m: float) -> np.ndarray:
         """Return the unsigned distance (nx, ny, nz) of a grid's points: exact within 3 cells, rounded to cells beyond.
 
