@@ -24,6 +24,7 @@ rule all:
         robot_figures(),
 
 
+include: "workflow/rules/compile.smk"
 include: "workflow/rules/scan.smk"
 include: "workflow/rules/fuse.smk"
 include: "workflow/rules/label.smk"

@@ -14,6 +14,7 @@ def raw_files(wildcards):
 rule fuse:
     input:
         raw_files,
+        compiled=compiled("fuse"),
     output:
         mesh=f"{PROCESSED}/fuse/{{object}}/mesh.ply",
         cloud=f"{PROCESSED}/fuse/{{object}}/cloud.parquet",

@@ -17,6 +17,7 @@ wildcard_constraints:
 rule simulate_container:
     input:
         mesh=rules.fuse.output.mesh,
+        compiled=compiled("simulate"),
     output:
         container=f"{PROCESSED}/simulate/containers/{{object}}.npz",
     log:
