@@ -196,6 +196,23 @@ def test_a_method_that_leaves_an_object_without_a_rim_is_compared_all_the_same(p
     assert found["wall_side_flips"] == 0.0 < found["fit_s"]
 
 
+def test_a_second_source_is_warped_and_measured_beside_the_first(project):
+    project.configure("objects.source", ["mug", "short_cup"])
+    stages = ("label_from_further", "warp", "parametrise")
+    further = set().union(*(_each(stage) for stage in stages))
+    assert project.planned() == further | {"adopt_labels", "learn_from_further", "assemble_parameters"}
+    told = project.call("data/processed/parametrise/short_cup/parameters.parquet")
+    assert told.returncode == 0, told.stdout
+    first, second = (
+        read_table(project / f"data/processed/parametrise/{name}/parameters.parquet", "parameters")
+        .query("mapping == 'label_mapping'")
+        .set_index("object")["radius_m"]
+        for name in ("mug", "short_cup")
+    )
+    assert set(second.index) == OBJECTS
+    assert second[sorted(OBJECTS)].to_numpy() == pytest.approx(first[sorted(OBJECTS)].to_numpy(), rel=0.03)
+
+
 def test_two_keys_that_swap_their_values_are_a_change(project):
     project.configure("classify.samples", 3)
     project.configure("classify.draws", 50)
