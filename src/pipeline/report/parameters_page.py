@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -169,7 +169,7 @@ def _spout(axis: "Axes", drawn: Drawn) -> None:
     if depth > SPOUT_MM:
         along, height = _lip(drawn)
         depth_mm = [height, height + depth]
-        look = {"color": ORANGE, "lw": 2.4, "solid_capstyle": "butt", "label": "depth of the spout"}
+        look: Any = {"color": ORANGE, "lw": 2.4, "solid_capstyle": "butt", "label": "depth of the spout"}
         axis.plot([along + BESIDE_MM] * 2, depth_mm, **look)
 
 
