@@ -215,7 +215,7 @@ rule report_primitives:
     shell:
         "python -m pipeline.report.primitives --primitives {input.primitives:q} --trajectories {input.trajectories:q}"
         " --pages {output.pages:q} --numbers {output.numbers:q} {params.options} --parameters {input.parameters:q} {params.conditioned}"
-        " > {log:q} 2>&1"
+        " 2>&1 | tee {log:q} >&2"
 
 
 rule report_physics:
