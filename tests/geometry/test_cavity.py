@@ -110,14 +110,18 @@ def test_a_mesh_without_faces_is_refused_by_name() -> None:
 
 def test_lips(cup: Cavity) -> None:
     assert lip_alone(cup) == pytest.approx([RADIUS_M, 0, 0.1], abs=0.001)  # a level rim: furthest along +x
-    jug = shape("jug")
-    spout = lip_alone(cavity(jug.vertices_m, jug.triangles, name="jug"))
-    assert np.arctan2(spout[1], spout[0]) == pytest.approx(0.0, abs=0.1)
     T_world_held = transform(rotation_about(np.array([0.0, 0.0, 1.0]), np.pi / 2), np.array([0.3, 0.0, 0.2]))
     # The world's +x is the cup's -y after a quarter turn.
     assert lip_towards(cup, T_world_held, np.array([1.0, 0.0, 0.3])) == pytest.approx(
         [0, -RADIUS_M, 0.1], abs=0.001
     )
+
+
+@pytest.mark.parametrize("yaw_rad", [0.0, 1.5, 2.6, -2.0])
+def test_the_lip_of_a_jug_is_the_middle_of_its_spout_however_it_is_turned(yaw_rad: float) -> None:
+    jug, R = shape("jug"), rotation_about(np.array([0.0, 0.0, 1.0]), yaw_rad)
+    lip = R.T @ lip_alone(cavity(jug.vertices_m @ R.T, jug.triangles, name="jug"))
+    assert np.arctan2(lip[1], lip[0]) == pytest.approx(0.0, abs=0.05)
 
 
 @pytest.mark.parametrize("azimuth", [0.0, 1.0, 3.0, -2.0])

@@ -82,8 +82,10 @@ def test_labels_find_the_parts_that_the_baseline_misses(metrics):
 
 
 def test_no_wall_is_crossed_and_no_point_left_alone(metrics):
-    assert metrics["warp.label_mapping.wall_side_flips"] == 0.0
-    assert metrics["warp.label_mapping.share_without_candidate"] < 0.01
+    for mapping in ("label_mapping", "point_mapping"):
+        assert metrics[f"warp.{mapping}.wall_side_flips"] == 0.0, mapping
+        assert metrics[f"warp.{mapping}.share_without_candidate"] < 0.01, mapping
+        assert metrics[f"warp.{mapping}.residual_m"] <= 0.002, mapping
 
 
 BARS = {

@@ -3,9 +3,11 @@
 import numpy as np
 import pandas as pd
 import pytest
+from PIL import Image
 
 from pipeline.report import execution_numbers as numbers
 from pipeline.report import pairs
+from pipeline.report.execution import write_gif
 from pipeline.report.execution_page import Film, pictures, rates, safety_table
 
 
@@ -107,3 +109,15 @@ def test_pages_are_drawn_of_any_number_of_pairs_and_sets():
     found = pairs.numbers(both)
     assert found["pairs.standard.fit.success"] == pytest.approx(0.6)
     assert found["pairs.standard.fit.failed.aim"] == 8
+
+
+def test_the_film_is_as_long_as_its_longest_and_tells_what_it_is_at(tmp_path):
+    ramp = np.tile(np.linspace(0, 255, 60, dtype=np.uint8)[:, None], (40, 1, 3))
+    moving = np.stack([np.roll(ramp, 7 * k, axis=1) for k in range(5)])
+    short, long = (Film("a into\nb", "", moving[:n], 0.1, 0.2) for n in (2, 5))
+    told: list[str] = []
+    write_gif(tmp_path / "film.gif", [short, long], told.append)
+    assert told == ["films side by side", "making them smaller", "writing the film"]
+    with Image.open(tmp_path / "film.gif") as film:
+        assert film.n_frames == 5
+        assert film.size == (720, 240)

@@ -1,12 +1,16 @@
 """The whole workflow on the small overlay: it runs, it is reproducible, and a change reruns what depends on it and no more."""
 
 import os
+import sys
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
 import trimesh
 
+from pipeline import command
 from pipeline.artefacts import read_json, read_table
+from pipeline.report import accuracy, scans
 from pipeline.report.accuracy import read_truth
 from pipeline.report.warping import scores
 from pipeline.report.warping_page import MEASURES
@@ -192,6 +196,23 @@ def test_a_method_that_leaves_an_object_without_a_rim_is_compared_all_the_same(p
     assert found["wall_side_flips"] == 0.0 < found["fit_s"]
 
 
+def test_a_second_source_is_warped_and_measured_beside_the_first(project):
+    project.configure("objects.source", ["mug", "short_cup"])
+    stages = ("label_from_further", "warp", "parametrise")
+    further = set().union(*(_each(stage) for stage in stages))
+    assert project.planned() == further | {"adopt_labels", "learn_from_further", "assemble_parameters"}
+    told = project.call("data/processed/parametrise/short_cup/parameters.parquet")
+    assert told.returncode == 0, told.stdout
+    first, second = (
+        read_table(project / f"data/processed/parametrise/{name}/parameters.parquet", "parameters")
+        .query("mapping == 'label_mapping'")
+        .set_index("object")["radius_m"]
+        for name in ("mug", "short_cup")
+    )
+    assert set(second.index) == OBJECTS
+    assert second[sorted(OBJECTS)].to_numpy() == pytest.approx(first[sorted(OBJECTS)].to_numpy(), rel=0.03)
+
+
 def test_two_keys_that_swap_their_values_are_a_change(project):
     project.configure("classify.samples", 3)
     project.configure("classify.draws", 50)
@@ -308,3 +329,30 @@ def test_the_figure_alone_can_be_asked_for_without_tracking(project):
     assert told.returncode == 0, told.stdout
     assert (project / "reports/metrics.json").is_file()
     assert len(_runs(project)) == runs
+
+
+@pytest.mark.parametrize("module", [accuracy, scans])
+def test_reports_that_take_seconds_tell_the_step_they_are_at(finished, tmp_path, monkeypatch, module):
+    processed, name = finished / "data/processed", "short_cup"
+    fused = processed / "fuse" / name
+    options = {
+        accuracy: ["--processed", processed, "--source", "mug", "--object", name, "--errors"],
+        scans: [
+            *("--mesh", fused / "mesh.ply", "--cloud", fused / "cloud.parquet"),
+            *("--fusion", fused / "fusion.json", "--output"),
+        ],
+    }[module]
+    begun: list[str] = []
+    announced: list[int] = []
+
+    @contextmanager
+    def steps(what, total):
+        assert "short_cup" in what
+        announced.append(total)
+        yield begun.append
+
+    monkeypatch.setattr(command, "steps", steps)
+    monkeypatch.setattr(sys, "argv", ["report", *map(str, options), str(tmp_path / "made.png")])
+    module.main()
+    assert [len(begun)] == announced
+    assert (tmp_path / "made.png").exists()

@@ -114,7 +114,7 @@ rule execute_safety:
     shell:
         "python -m pipeline.execute.safety --pairs {params.pairs} {params.containers} --parameters {input.parameters:q}"
         " --primitives {params.primitives} --demonstration {input.pair:q} --safety {output.safety:q} {params.samples} {params.seed}"
-        " > {log:q} 2>&1"
+        " 2>&1 | tee {log:q} >&2"
 
 
 rule execute_film_balls:

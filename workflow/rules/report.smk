@@ -37,7 +37,7 @@ rule accuracy:
         code=code("pipeline.report.accuracy"),
     shell:
         "python -m pipeline.report.accuracy --processed {params.processed:q} --source {params.source} --object {wildcards.object}"
-        " --errors {output.errors:q} > {log:q} 2>&1"
+        " --errors {output.errors:q} 2>&1 | tee {log:q} >&2"
 
 
 rule report:
@@ -188,7 +188,7 @@ rule draw_scan:
         code=code("pipeline.report.scans"),
     shell:
         "python -m pipeline.report.scans --mesh {input.mesh:q} --cloud {input.cloud:q} --fusion {input.fusion:q}"
-        " --output {output.page:q} > {log:q} 2>&1"
+        " --output {output.page:q} 2>&1 | tee {log:q} >&2"
 
 
 rule report_primitives:
@@ -215,7 +215,7 @@ rule report_primitives:
     shell:
         "python -m pipeline.report.primitives --primitives {input.primitives:q} --trajectories {input.trajectories:q}"
         " --pages {output.pages:q} --numbers {output.numbers:q} {params.options} --parameters {input.parameters:q} {params.conditioned}"
-        " > {log:q} 2>&1"
+        " 2>&1 | tee {log:q} >&2"
 
 
 rule report_physics:
@@ -342,7 +342,7 @@ rule report_execution:
     shell:
         "python -m pipeline.report.execution --executions {input.executions:q} --trajectories {input.trajectories:q}"
         " --parameters {input.parameters:q} --safety {input.safety:q} --demonstration {input.pair:q} --films {params.films}"
-        " --pages {output.pages:q} --film {output.film:q} --numbers {output.numbers:q} > {log:q} 2>&1"
+        " --pages {output.pages:q} --film {output.film:q} --numbers {output.numbers:q} 2>&1 | tee {log:q} >&2"
 
 
 rule report_watching:
@@ -367,7 +367,7 @@ rule report_watching:
     shell:
         "python -m pipeline.report.watching --source {SOURCE} --pouring {input.pouring:q} --filling {input.filling:q}"
         " --parameters {input.parameters:q} --trajectories {input.trajectories:q} --balls {input.balls:q} --liquid {input.liquid:q}"
-        " --pages {output.pages:q} --numbers {output.numbers:q} {params.fill} {params.filling} {params.spacing} > {log:q} 2>&1"
+        " --pages {output.pages:q} --numbers {output.numbers:q} {params.fill} {params.filling} {params.spacing} 2>&1 | tee {log:q} >&2"
 
 
 rule report_pairs:

@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.artefacts import read_arrays
 from pipeline.execute.cell import Solid
-from pipeline.geometry.cavity import TIE_M
+from pipeline.geometry.cavity import lowest_point
 
 
 def solid(name: str, path: Path) -> Solid:
@@ -33,9 +33,7 @@ def lip_m(path: Path, yaw_rad: float) -> np.ndarray:
 
 
 def spout_yaw_rad(path: Path) -> float:
-    """Return where a container pours to, its own frame: its rim's lowest point, of level ones that furthest along +x."""
+    """Return where a container pours to, its own frame: its rim's lowest point, of a level rim that furthest along +x."""
     arrays = read_arrays(path)
-    rim_m, opening = arrays["cavity_rim_m"], arrays["cavity_opening_m"]
-    low = rim_m[rim_m[:, 2] <= rim_m[:, 2].min() + TIE_M]
-    out = low[np.argmax(low[:, 0])] - opening
+    out = lowest_point(arrays["cavity_rim_m"]) - arrays["cavity_opening_m"]
     return float(np.arctan2(out[1], out[0]))

@@ -44,7 +44,7 @@ def main() -> None:
     )
     demonstrated, containers = (shown["held_object"], shown["target_object"]), dict(options.containers)
     rows = []
-    for pair in options.pairs:
+    for pair in command.progress(options.pairs, len(options.pairs), "drawing pours: pairs"):
         held, target = pair.split("/")
         for features, path in options.primitives:
             primitive = primitives.read(path, parameters, features, (held, target), demonstrated)

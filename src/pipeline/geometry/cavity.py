@@ -14,6 +14,7 @@ from pipeline.geometry.surface import Surface, subdivided
 
 AZIMUTHS = 256
 TIE_M = 0.002  # rims that are level to within this count as level
+_BED = 16  # a spout's bed is looked for in heights averaged over an eighth of the turn: this share to either side
 _RIM_STEP_M = 0.0001
 _RIM_GAP_M = 0.004  # a hole in the scan below the rim's edge may be this high
 _LEAST_M3 = 5e-6  # a container that keeps less than 5 ml is none
@@ -73,9 +74,27 @@ def cavity(vertices_m: np.ndarray, triangles: np.ndarray, *, name: str, cell_m: 
 
 
 def lip_alone(cup: Cavity) -> np.ndarray:
-    """Return the lip (3,) of a cup alone: the rim's lowest point; among ties the one furthest along +x."""
-    low = cup.rim_m[cup.rim_m[:, 2] <= cup.rim_m[:, 2].min() + TIE_M]
-    return low[np.argmax(low[:, 0])].copy()
+    """Return the lip (3,) of a cup alone: the rim's lowest point, of a level rim that furthest along +x."""
+    return lowest_point(cup.rim_m)
+
+
+def spout_depth(contour_m: np.ndarray) -> float:
+    """Return how far the lowest point of a contour (M, 3) is below its median height, metres."""
+    return float(np.median(contour_m[:, 2]) - contour_m[:, 2].min())
+
+
+def lowest_point(contour_m: np.ndarray) -> np.ndarray:
+    """Return the lowest point (3,) of a rim's contour (M, 3), in its order round.
+
+    A level rim has none: where nothing is more than 2 mm below the median height, it is the point furthest along +x of those
+    within 2 mm of the lowest. A spout's is the middle of its bed, which turns with the object.
+    """
+    height = contour_m[:, 2]
+    if spout_depth(contour_m) <= TIE_M:
+        return contour_m[np.argmax(np.where(height <= height.min() + TIE_M, contour_m[:, 0], -np.inf))].copy()
+    reach = len(contour_m) // _BED
+    bed = np.mean([np.roll(height, shift) for shift in range(-reach, reach + 1)], axis=0)
+    return contour_m[np.argmin(bed)].copy()
 
 
 def lip_towards(cup: Cavity, T_world_held: np.ndarray, point_world: np.ndarray) -> np.ndarray:

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from pipeline.geometry.cavity import lowest_point, spout_depth
 from pipeline.parametrise.library import ingredient, parameter
 
 SECTORS = 90
-LEVEL_M = 0.002  # contours that are level to within this have no lowest point
 _CENTRINGS = 3
 
 
@@ -62,14 +62,13 @@ def radius_m(rim_m: np.ndarray, opening_m: np.ndarray, rim_turn: tuple[np.ndarra
 
 @ingredient
 def lowest_m(contour_m: np.ndarray) -> np.ndarray:
-    """Lowest point of the contour (3,); of level ones that furthest along +x."""
-    level = contour_m[contour_m[:, 2] <= contour_m[:, 2].min() + LEVEL_M]
-    return level[np.argmax(level[:, 0])]
+    """Lowest point of the contour (3,): the middle of a spout's bed; of a level rim, the point furthest along +x."""
+    return lowest_point(contour_m)
 
 
 @parameter("m", parts="xyz")
 def lip_m(rim_m: np.ndarray, lowest_m: np.ndarray) -> np.ndarray:
-    """Lip of the cup alone: the rim point nearest to the contour's lowest (of level ones, 2 mm, that furthest along +x)."""
+    """Lip of the cup alone: the rim point nearest to the contour's lowest (of a level rim, 2 mm, to that furthest along +x)."""
     return rim_m[np.argmin(np.linalg.norm(rim_m - lowest_m, axis=1))]
 
 
@@ -86,4 +85,4 @@ def spout_direction(lowest_m: np.ndarray, opening_m: np.ndarray) -> np.ndarray:
 @parameter("m")
 def spout_depth_m(contour_m: np.ndarray) -> float:
     """Depth of the spout: how far the contour's lowest point is below its median height."""
-    return float(np.median(contour_m[:, 2]) - contour_m[:, 2].min())
+    return spout_depth(contour_m)

@@ -132,7 +132,7 @@ def _told(numbers: dict[str, float], name: str) -> str:
     if f"{head}.low" not in numbers:
         return f"{numbers[name]:.4f}"
     low, high, p = (numbers[f"{head}.{end}"] for end in ("low", "high", "p"))
-    return f"{numbers[head]:+.4f}\n[{low:+.4f}, {high:+.4f}]\np = {p:.3f}"
+    return f"{numbers[head]:+.4f}\n[{low:+.4f}, {high:+.4f}]\np = {p:.3f}".replace("-", "−")
 
 
 def _note(trials: int, draws: int) -> str:
@@ -140,7 +140,7 @@ def _note(trials: int, draws: int) -> str:
         "Filled: novel objects; open: other trials of the training object. Bars: 95 % intervals of a bootstrap over objects, "
         "jointly as trainers and as tests.\nRight: area of label mapping on novel objects less the default's (dotted), on the same "
         f"replicates, its interval and p value. {draws} training sets an object.\nTrials are the default's own, except for keys of "
-        f"simulate: {trials} new ones an object. Other sources than\nthe annotated object take the labels that "
+        f"simulate: {trials} new ones an object.\nOther sources than the annotated object take the labels that "
         "were mapped onto them from it."
     )
 

@@ -1,5 +1,6 @@
 """How near fusion, labels and parameters come to the truth about the demonstration objects: the truth's only reader."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -35,7 +36,9 @@ def main() -> None:
     parser.add_argument("--object", required=True, help="name of the demonstration object")
     parser.add_argument("--errors", type=Path, required=True, help="errors to write, JSON")
     options = parser.parse_args()
-    write_json(options.errors, errors(options.processed, options.source, options.object))
+    with command.steps(f"comparing {options.object} with its truth", 3) as tell:
+        found = errors(options.processed, options.source, options.object, tell)
+    write_json(options.errors, found)
 
 
 @dataclass(frozen=True)
@@ -69,10 +72,14 @@ def read_truth(processed: Path, name: str) -> Truth:
     )
 
 
-def errors(processed: Path, source: str, name: str) -> dict[str, float]:
+def errors(
+    processed: Path, source: str, name: str, tell: Callable[[str], None] = command.untold
+) -> dict[str, float]:
     """Return all errors of one object as `<stage>.<what>`; of labels, where it is not the source."""
+    tell("surface")
     truth = read_truth(processed, name)
     found = {f"fuse.{key}": value for key, value in fusion_errors(processed, name, truth).items()}
+    tell("parameters")
     folder = processed / "parametrise" / source
     parameters = read_table(folder / f"{name}.parquet", "parameters").set_index("mapping")
     listed = read_table(folder / "uncertainties" / f"{name}.parquet", "uncertainties")
@@ -80,6 +87,7 @@ def errors(processed: Path, source: str, name: str) -> dict[str, float]:
         more = listed[listed["mapping"] == mapping].set_index("parameter")["value"]
         compared = parameter_errors(row, more, truth)
         found |= {f"parametrise.{mapping}.{key}": value for key, value in compared.items()}
+    tell("labels")
     return found | (label_errors(processed, source, name, truth) if name != source else {})
 
 

@@ -1,5 +1,6 @@
 """Report what the robot poured: reports/execution.pdf (Fig. 5 and rates), a film, and the numbers."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,9 +45,11 @@ def main() -> None:
     executed = execution_numbers.unsafe(trajectories, read_table(options.parameters, "parameters"))
     safety = execution_numbers.with_drawn(executed, read_table(options.safety, "safety"))
     films = [film(pair, path, executions, demonstrated) for pair, path in options.films]
-    pages = [execution_page.pictures(films), execution_page.rates(executions, safety)]
-    save([*pages, execution_page.safety_table(safety)], options.pages)
-    write_gif(options.film, films)
+    with command.steps("what the robot poured", 4) as tell:
+        tell("pages")
+        pages = [execution_page.pictures(films), execution_page.rates(executions, safety)]
+        save([*pages, execution_page.safety_table(safety)], options.pages)
+        write_gif(options.film, films, tell)
     write_json(options.numbers, execution_numbers.numbers(executions, safety, demonstrated))
 
 
@@ -72,18 +75,21 @@ def film(pair: str, path: Path, executions: "pd.DataFrame", demonstrated: tuple[
     return Film(title, caption, arrays["images"], float(arrays["every_s"]), drop_s)
 
 
-def write_gif(path: Path, films: "list[Film]") -> None:
+def write_gif(path: Path, films: "list[Film]", tell: Callable[[str], None] = command.untold) -> None:
     """Write the films side by side, two in a row, as an animated GIF; the shorter ones wait at their end."""
     from PIL import Image
 
+    tell("films side by side")
     length = max(len(film.images) for film in films)
     frames = [
         Image.fromarray(_mosaic([film.images[min(number, len(film.images) - 1)] for film in films]))
         for number in range(length)
     ]
+    tell("making them smaller")
     width = _WIDTH_PX * min(len(films), 2)
     size = width, round(frames[0].height * width / frames[0].width)
     small = [np.asarray(frame.resize(size, Image.Resampling.LANCZOS)) for frame in frames]
+    tell("writing the film")
     write_film(path, small, films[0].every_s)
 
 

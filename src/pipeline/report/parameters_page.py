@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,7 @@ COLUMNS = 4
 POINTS = 1200
 CUT_MM = 2.5  # half the thickness of the slice that is drawn dark
 SPOUT_MM = 2.0  # rims that are level to within this have no spout
+BESIDE_MM = 9.0  # a spout is less deep than the lip's mark is high: its depth is drawn beside it
 
 Values = dict[str, float]
 
@@ -167,10 +168,9 @@ def _spout(axis: "Axes", drawn: Drawn) -> None:
     depth = drawn.values["spout_depth_m"] * 1e3
     if depth > SPOUT_MM:
         along, height = _lip(drawn)
-        axis.annotate(
-            "", (along, height), (along, height + depth), arrowprops={"arrowstyle": "<-", "color": ORANGE}
-        )
-        axis.plot([], [], color=ORANGE, lw=0.8, label="depth of the spout")
+        depth_mm = [height, height + depth]
+        look: Any = {"color": ORANGE, "lw": 2.4, "solid_capstyle": "butt", "label": "depth of the spout"}
+        axis.plot([along + BESIDE_MM] * 2, depth_mm, **look)
 
 
 PICTURES: tuple[Callable[["Axes", Drawn], None], ...] = (

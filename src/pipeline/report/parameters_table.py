@@ -86,12 +86,12 @@ def _title(name: str, unit: str) -> str:
 
 def _cell(row: pd.Series, name: str, errors: Mapping[str, float], mapping: str) -> str:
     factor, _, decimals = SHOWN.get(row["unit"], (1.0, row["unit"], 3))
-    text = f"{row['value'] * factor:.{decimals}f} ± {row['std'] * factor:.{decimals}f}".replace("-", "−")
+    text = f"{row['value'] * factor:z.{decimals}f} ± {row['std'] * factor:.{decimals}f}".replace("-", "−")
     key, unit = ERRORS.get(name, ("", ""))
     error = errors.get(f"parametrise.{mapping}.{key}")
     if error is None:
         return text
     shown = (
-        f"{100 * error:+.1f} %" if unit == "%" else f"{error:.1f} mm" if unit == "mm" else f"{error:+.1f}°"
+        f"{100 * error:+z.1f} %" if unit == "%" else f"{error:.1f} mm" if unit == "mm" else f"{error:+z.1f}°"
     )
     return f"{text} ({shown})".replace("-", "−")

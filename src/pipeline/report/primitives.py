@@ -48,16 +48,18 @@ def main() -> None:
     ruler = {one["features"]: np.array(one["references"]) for one in about}["label_mapping"]
     pages: list[Figure] = []
     found: dict[str, Any] = {}
-    for learnt, promp, table in zip(about, primitives, tables, strict=True):
-        ones = ruler if learnt["features"] == "standard" else np.ones(4)
-        pages.append(draw(promp, table, learnt, ones))
-        found |= numbers(promp, table, learnt, options.prior_demonstrations)
-    if options.conditioned:
-        scaled = {one["features"]: promp for one, promp in zip(about, primitives, strict=True)}[
-            "label_mapping"
-        ]
-        pages.append(_conditioned(options, scaled))
-    save(pages, options.pages)
+    with command.steps("motor primitives", len(primitives) + 2) as tell:
+        for learnt, promp, table in zip(about, primitives, tables, strict=True):
+            tell(learnt["features"].replace("_", " "))
+            ones = ruler if learnt["features"] == "standard" else np.ones(4)
+            pages.append(draw(promp, table, learnt, ones))
+            found |= numbers(promp, table, learnt, options.prior_demonstrations)
+        tell("conditioned on the pair")
+        if options.conditioned:
+            by_features = {one["features"]: promp for one, promp in zip(about, primitives, strict=True)}
+            pages.append(_conditioned(options, by_features["label_mapping"]))
+        tell("writing")
+        save(pages, options.pages)
     write_json(options.numbers, found)
 
 

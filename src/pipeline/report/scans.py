@@ -1,5 +1,6 @@
 """Draw one object's scan on a page: its surface from four sides, sections through the walls, the views and the residuals."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,10 +36,10 @@ def main() -> None:
 
     cloud = read_table(options.cloud, "cloud")
     name = options.fusion.parent.name
-    figure = draw(
-        name, read_mesh(options.mesh), points(cloud), cloud["seen"].to_numpy(bool), read_json(options.fusion)
-    )
-    with replacing(options.output) as temporary:
+    mesh, facts = read_mesh(options.mesh), read_json(options.fusion)
+    with command.steps(f"page on the scan of {name}", 3) as tell, replacing(options.output) as temporary:
+        figure = draw(name, mesh, points(cloud), cloud["seen"].to_numpy(bool), facts, tell)
+        tell("writing")
         figure.savefig(temporary, dpi=110, metadata={"Software": None})
 
 
@@ -48,6 +49,7 @@ def draw(
     points_m: "np.ndarray",
     seen: "np.ndarray",
     facts: dict[str, Any],
+    tell: Callable[[str], None] = command.untold,
 ) -> "Figure":
     """Return the page of an object: its mesh, cloud points (N, 3), which of them were seen (N,), content of fusion.json."""
     import matplotlib.pyplot as plt
@@ -59,12 +61,14 @@ def draw(
     with plt.rc_context(RC):
         figure = plt.figure(figsize=(10.5, 5.6), layout="constrained")
         grid = figure.add_gridspec(2, 4, height_ratios=(1.0, 1.1))
+        tell("sides")
         surface, tree = Surface(*mesh), cKDTree(points_m)
         for k, (azimuth, elevation, title) in enumerate(SIDES):
             axis = figure.add_subplot(grid[0, k])
             axis.imshow(shaded(surface, mesh[0], tree, seen, azimuth, elevation))
             axis.set_axis_off()
             axis.set_title(title)
+        tell("sections")
         for k, normal in enumerate(((0, 1, 0), (1, 0, 0))):
             _section(figure.add_subplot(grid[1, k]), mesh, normal)
         _views(figure.add_subplot(grid[1, 2], projection="polar"), facts)

@@ -125,7 +125,7 @@ def _panel(axis: "Axes", found: Scores, key: str) -> None:
         if np.isfinite(marked):
             axis.plot(min(marked, beyond), row, "D" if colour == BAD else "s", ms=5, color=colour, mew=0)
         else:
-            axis.text(beyond, row, "none on some", ha="right", va="center", fontsize=6, color=BAD)
+            axis.text(beyond, row - 0.3, "none on some", ha="right", va="bottom", fontsize=6, color=BAD)
     if measure.bar is not None:
         axis.axvline(measure.bar, color="black", ls="--", lw=0.8)
     axis.set_xlim(0.0 if not measure.higher else min(0.4, axis.get_xlim()[0]), 1.12 * measure.end)

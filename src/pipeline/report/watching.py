@@ -55,9 +55,13 @@ def main() -> None:
     learnt = _watchers(models, parameters, trajectories, options.source, portion)
     warped = parameters[parameters["mapping"] == "label_mapping"].set_index("object")
     fill_m3, radius_m = options.fill * warped["capacity_m3"], warped["radius_m"]
-    curves = watching_numbers.curves(trajectories, learnt, fill_m3, radius_m)
-    events = watching_numbers.events(curves, outcomes)
-    save([watching_page.moments(curves, outcomes), watching_page.leads(events)], options.pages)
+    with command.steps("what the classifiers say along pours", 3) as tell:
+        tell("curves")
+        curves = watching_numbers.curves(trajectories, learnt, fill_m3, radius_m)
+        tell("events")
+        events = watching_numbers.events(curves, outcomes)
+        tell("pages")
+        save([watching_page.moments(curves, outcomes), watching_page.leads(events)], options.pages)
     write_json(options.numbers, watching_numbers.numbers(events))
 
 
