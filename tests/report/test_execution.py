@@ -94,6 +94,17 @@ def test_a_tilt_above_its_reference_outside_the_opening_is_unsafe_on_the_way_in_
     assert (row["way_in"], row["ever"]) == (0.25, 0.5)
 
 
+def test_every_pair_that_fails_is_listed_with_the_causes_of_each_set():
+    label = executions({("a_b", "c"): 9, ("d", "c"): 10, ("e", "c"): 10})
+    standard = executions({("a_b", "c"): 10, ("d", "c"): 3, ("e", "c"): 10}, "standard")
+    none = executions({("f", "c"): 0}, "standard").assign(fits=False)
+    (page,) = pairs.failures(pd.concat([label, standard, none]))
+    texts = [text.get_text() for text in page.texts]
+    heads = [text for text in texts if text.startswith(("label mapping", "standard"))]
+    assert heads == ["label mapping\n97 % [90, 100]", "standard features\n77 % [30, 100]"]
+    assert texts[-6:] == ["a b → c", "9: aim 1", "", "d → c", "", "3: aim 7"]
+
+
 def test_pages_are_drawn_of_any_number_of_pairs_and_sets():
     both = pd.concat(
         [executions({("a", "b"): 9, ("c", "b"): 3}, name) for name in ("label_mapping", "standard")]
@@ -106,6 +117,7 @@ def test_pages_are_drawn_of_any_number_of_pairs_and_sets():
     shown = maps.axes[0].images[0].get_array()
     assert shown[0, 1] == pytest.approx(100 * 21 / 1050)  # one of ten spilled 21 of 105
     assert shown.mask[1, 1]
+    assert {text.get_text() for text in maps.axes[0].texts} == {"9", "3"}
     found = pairs.numbers(both)
     assert found["pairs.standard.fit.success"] == pytest.approx(0.6)
     assert found["pairs.standard.fit.failed.aim"] == 8

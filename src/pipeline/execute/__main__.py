@@ -6,6 +6,7 @@ Writes what the arm did, and which trajectories were refused before it moved. Wh
 import argparse
 import zlib
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,11 +17,13 @@ from pipeline import artefacts, command
 if TYPE_CHECKING:
     import pandas as pd
 
+    from pipeline.execute.cell import Cell
+    from pipeline.execute.following import Plan
     from pipeline.execute.primitives import Primitive
     from pipeline.execute.task import Task
 
 Row = dict[str, Any]
-Sample = Callable[[int, int], np.ndarray]
+Sample = Callable[[int, int, int], np.ndarray]
 
 
 def main() -> None:
@@ -87,28 +90,51 @@ def _executed(
     own = Task(lip_m, task.yaw_rad, containers.opening_m(options.target[1]))
     with Cell(cup, second, task.T_world_second, T_cup_flange(cup, task.yaw_rad)) as cell:
         for draw in command.progress(range(options.draws), options.draws, what):
-            for attempt in range(options.attempts):
-                wanted = sample(draw, attempt)
-                plan, done, off_m = following.plan(cell, task.cup_poses(wanted)), None, np.nan
-                if not plan.refused:
-                    poses = following.follow(cell, plan.q_rad)
+            tries = tried(partial(sample, draw), partial(_planned, cell, task), options.attempts)
+            for attempt, (wanted, found) in enumerate(tries):
+                done, off_m = None, np.nan
+                if not found.refused:
+                    poses = following.follow(cell, found.q_rad)
                     off_m = float(np.abs(task.trajectory(poses)[:, :3] - wanted[:, :3]).max())
                     done = _table(poses, own, task.T_world_second).assign(draw=draw)
-                said = {"draw": draw, "attempt": attempt, "refused": plan.refused, "off_plan_m": off_m}
+                said = {"draw": draw, "attempt": attempt, "refused": found.refused, "off_plan_m": off_m}
                 yield {**said, "duration_s": (len(wanted) - 1) * following.PLAN_S}, done
-                if done is not None:
-                    break
+
+
+def _planned(cell: "Cell", task: "Task", wanted: np.ndarray) -> "Plan":
+    from pipeline.execute import following
+
+    return following.plan(cell, task.cup_poses(wanted))
+
+
+def tried(
+    sample: Callable[[int, int], np.ndarray], plan: Callable[[np.ndarray], "Plan"], attempts: int
+) -> "Iterator[tuple[np.ndarray, Plan]]":
+    """Yield the samples (T, 4) of a draw with their plans until one is not refused; `sample` is told the attempt, and how high.
+
+    Each refusal as the second container would be touched raises those to come by a standard deviation.
+    """
+    from pipeline.execute.cell import SECOND
+
+    higher = 0
+    for attempt in range(attempts):
+        wanted = sample(attempt, higher)
+        found = plan(wanted)
+        yield wanted, found
+        if not found.refused:
+            break
+        higher += SECOND in found.refused
 
 
 def _sampler(primitive: "Primitive", seed: int) -> Sample:
     """Return what draws a trajectory (T, 4), metres and radians, every PLAN_S: the same random numbers for every feature set."""
     from pipeline.execute.following import PLAN_S
 
-    phase = np.linspace(0.0, 1.0, round(primitive.promp.duration_s / PLAN_S) + 1)
+    phase = np.linspace(0.0, 1.0, round(primitive.duration_s / PLAN_S) + 1)
     own = zlib.crc32("/".join(primitive.pair).encode())
 
-    def sample(draw: int, attempt: int) -> np.ndarray:
-        return primitive.samples(phase, 1, np.random.default_rng([seed, own, draw, attempt]))[0]
+    def sample(draw: int, attempt: int, higher: int) -> np.ndarray:
+        return primitive.samples(phase, 1, np.random.default_rng([seed, own, draw, attempt]), higher)[0]
 
     return sample
 

@@ -19,6 +19,7 @@ TORQUE_LIMIT_NM = np.array([176.0, 176.0, 110.0, 110.0, 110.0, 40.0, 40.0])
 STEP_S = 1.0 / 240.0
 N_JOINTS = 7
 FLANGE = 6
+SECOND = "the second container"
 READY_RAD = np.array([0.0, 0.45, 0.0, -1.65, 0.0, -0.53, 0.0])
 PARKED_RAD = np.array([0.0, -0.6, 0.0, -2.0, 0.0, 0.6, 0.0])
 _BASE_M = np.array([-0.10, -0.62, 0.0])
@@ -27,7 +28,6 @@ _REACH_M = 0.125  # from the cup's axis to the flange: a hand, and a handle, hav
 _GRIP_AT = 0.6  # of the cup's height
 _HAND_RADIUS_M = 0.014
 _CUP_KG, _HAND_KG = 0.5, 0.5  # what the last joint carries besides itself, contents included
-_NEAR_M = 0.05
 
 
 @dataclass(frozen=True)
@@ -168,7 +168,7 @@ class Cell:
     def touching(self) -> str:
         """Return what touches what, in words; nothing when all is clear. Cup, hand, arm, table, second container, other arm."""
         movers = [(self.held, "the cup"), (self.hand, "the hand")]
-        still = [(self.second, "the second container"), (self.table, "the table")]
+        still = [(self.second, SECOND), (self.table, "the table")]
         for body, name in movers:
             for other, what in (*still, (self.other_arm, "the other arm")):
                 if pybullet.getClosestPoints(body, other, 0.0, physicsClientId=self._client):

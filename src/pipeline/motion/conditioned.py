@@ -78,7 +78,12 @@ class ConditionedProMP:
             np.asarray(y, float) - phi @ (slope @ c).reshape(-1, first.n_basis).T
             for phi, y, c in zip(values, trajectories, off, strict=True)
         ]
-        return cls(ProMP.fit(about, phases, **settings), slope, centre, scatter)
+        residual = ProMP.fit(about, phases, **settings)
+        # What the slopes have fitted away is missing about them, as in any regression's residual variance.
+        fitted = float(np.trace(np.linalg.solve(scatter, off.T @ off)))
+        wider = len(contexts) / (len(contexts) - fitted)
+        residual = replace(residual, weights_covariance=wider * residual.weights_covariance)
+        return cls(residual, slope, centre, scatter)
 
     def given(self, context: np.ndarray) -> ProMP:
         """Return the primitive of the pair with these log parameters (K,)."""

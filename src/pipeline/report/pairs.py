@@ -15,7 +15,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_ROWS_A_PAGE = 66
+_ROWS_A_PAGE = 62
+_LIGHT_FROM = 55.0  # per cent: darker, a black number is not read
+_LEGEND = (
+    "In the heads: of all executions with pairs that fit, with a 95 % interval over pairs. Empty: all succeeded.\n"
+    "arm: could follow no sample; early pour: came down before the lip was above the opening; overflow: had been in;\n"
+    "aim: fell beside it; lip: less than 80 % came over it; leak: the simulation lost something. One cause an execution: of\n"
+    "what was spilled the largest."
+)
 
 
 def main() -> None:
@@ -59,12 +66,12 @@ def maps(executions: "pd.DataFrame") -> "Figure":
     import matplotlib.pyplot as plt
 
     names = sorted(set(executions["held_object"]) | set(executions["target_object"]))
-    sets = [name for name in WORDS if name in set(executions["features"])]
+    sets = _sets(executions)
     with plt.rc_context({**RC, "axes.spines.top": True, "axes.spines.right": True}):
         figure, axes = plt.subplots(
             1,
             len(sets),
-            figsize=(2.9 * len(sets) + 1.3, 3.9),
+            figsize=(2.9 * len(sets) + 1.3, 4.6),
             sharey=True,
             squeeze=False,
             layout="constrained",
@@ -74,11 +81,17 @@ def maps(executions: "pd.DataFrame") -> "Figure":
             axis.set_title(WORDS[features])
         axes[0, 0].set_ylabel("held object")
         bar = figure.colorbar(image, ax=axes[0], shrink=0.75)
-        bar.set_label("spilled, % of what was poured\n(grey: itself, or the arm could follow no sample)")
+        bar.set_label("spilled, % of what was poured")
         figure.supxlabel(
-            "second container (○: what is poured does not fit; ×: fewer than 9 of 10 succeed)", fontsize=8
+            "second container\nnumbers: successes of ten, where not all; ○: what is poured does not fit;\n"
+            "grey: the arm could follow no sample, or none was tried",
+            fontsize=8,
         )
     return figure
+
+
+def _sets(executions: "pd.DataFrame") -> list[str]:
+    return [name for name in WORDS if name in set(executions["features"])]
 
 
 def _map(axis: "Axes", rows: "pd.DataFrame", names: list[str]):
@@ -87,11 +100,11 @@ def _map(axis: "Axes", rows: "pd.DataFrame", names: list[str]):
         at = names.index(held), names.index(target)
         if part["n_poured"].sum():
             grid[at] = 100.0 * part["n_spilled"].sum() / part["n_poured"].sum()
-        mark = "o" if not part["fits"].all() else "x" if part["success"].mean() < 0.9 else ""
-        if mark:
-            axis.plot(at[1], at[0], marker=mark, ms=4, color="black", mfc="none", mew=0.8)
+        mark = "○" if not part["fits"].all() else "" if part["success"].all() else str(part["success"].sum())
+        light = grid[at] > _LIGHT_FROM
+        axis.text(*at[::-1], mark, ha="center", va="center", fontsize=6, color="white" if light else "black")
     axis.set_facecolor("0.8")
-    image = axis.imshow(grid, cmap="viridis_r", vmin=0.0, vmax=100.0)
+    image = axis.imshow(grid, cmap="magma_r", vmin=0.0, vmax=100.0)
     words = [name.replace("_", " ") for name in names]
     axis.set_xticks(range(len(names)), words, rotation=90)
     axis.set_yticks(range(len(names)), words)
@@ -99,26 +112,53 @@ def _map(axis: "Axes", rows: "pd.DataFrame", names: list[str]):
 
 
 def failures(executions: "pd.DataFrame") -> "list[Figure]":
-    """Return pages with a line for every pair that fits and does not always succeed, with its causes."""
+    """Return pages with a row for every pair that fits and does not always succeed, with the causes of each feature set."""
+    fit = executions[executions["fits"]]
+    sets, found = _sets(fit), numbers(fit)
+    heads = [f"{WORDS[name]}\n{_rate(found, name)}" for name in sets]
+    table = by_pair(fit).set_index([*PAIR, "features"])
+    failing = [pair for pair, part in fit.groupby(PAIR) if not part["success"].all()]
+    rows = [[_words(pair), *(_told(table, (*pair, name)) for name in sets)] for pair in failing] or [
+        ["none", *([""] * len(sets))]
+    ]
+    return [_page(heads, rows[first : first + _ROWS_A_PAGE]) for first in range(0, len(rows), _ROWS_A_PAGE)]
+
+
+def _words(pair: tuple[str, str]) -> str:
+    return " → ".join(name.replace("_", " ") for name in pair)
+
+
+def _rate(found: dict[str, float], features: str) -> str:
+    rate, low, high = (100 * found[f"pairs.{features}.fit.success{end}"] for end in ("", "_low", "_high"))
+    return f"{rate:.0f} % [{low:.0f}, {high:.0f}]"
+
+
+def _told(table: "pd.DataFrame", key: tuple[str, str, str]) -> str:
+    """Return successes and causes in words; nothing where all succeeded or none was tried."""
+    if key not in table.index or table.loc[key, "successes"] == table.loc[key, "n"]:
+        return ""
+    return f"{table.loc[key, 'successes']}: {table.loc[key, 'causes']}"
+
+
+def _page(heads: list[str], rows: list[list[str]]) -> "Figure":
     import matplotlib.pyplot as plt
 
-    table = by_pair(executions[executions["fits"]])
-    lines = [
-        f"{row.held_object:>13} → {row.target_object:<13} {WORDS[row.features]:<18}"
-        f"{row.successes:>3} of {row.n:<3} {100 * row.spilled_share:5.1f} % spilled   {row.causes}"
-        for row in table.itertuples()
-        if row.successes < row.n
-    ]
-    pages = []
-    for first in range(0, max(len(lines), 1), _ROWS_A_PAGE):
-        with plt.rc_context(RC):
-            figure = plt.figure(figsize=(8.27, 11.69))
-        title = "Pairs that fit and do not always succeed: executions, spilled of what was in the cup, causes"
-        figure.text(0.06, 0.965, title, fontsize=9, va="top")
-        text = "\n".join(lines[first : first + _ROWS_A_PAGE]) or "none"
-        figure.text(0.06, 0.945, text, fontsize=6.5, family="monospace", va="top", linespacing=1.5)
-        pages.append(figure)
-    return pages
+    with plt.rc_context(RC):
+        figure = plt.figure(figsize=(8.27, 11.69))
+    figure.text(
+        0.05,
+        0.965,
+        "Pairs that fit and do not always succeed: successes, and what the others failed of",
+        fontsize=9,
+    )
+    figure.text(0.05, 0.955, _LEGEND, fontsize=7, va="top", linespacing=1.4)
+    lefts = [0.05, *(0.22 + 0.765 * number / len(heads) for number in range(len(heads)))]
+    for left, head in zip(lefts[1:], heads, strict=True):
+        figure.text(left, 0.88, head, fontsize=7, va="bottom")
+    for number, row in enumerate(rows):
+        for left, text in zip(lefts, row, strict=True):
+            figure.text(left, 0.868 - 0.0133 * number, text, fontsize=5.8, va="center")
+    return figure
 
 
 if __name__ == "__main__":
