@@ -15,7 +15,7 @@ import yaml
 ROOT = Path(__file__).parents[2]
 PARTS = ["Snakefile", "config", "workflow", "profiles", "src"]
 JOB = re.compile(r"^(?:local)?rule (\w+):\n((?:    .*\n)*)", re.MULTILINE)
-WILDCARD = re.compile(r"(?:object|experiment)=(\w+)")
+WILDCARD = re.compile(r"(?:object|experiment|stage)=(\w+)")
 
 
 @dataclass(frozen=True)

@@ -96,7 +96,7 @@ def test_numbers_on_the_command_line(fresh):
     before = fresh.planned(
         "data/processed/fuse/mug/mesh.ply", "--config", "fuse={voxel_m: 9e-4, points: 7000}"
     )
-    assert before == {"scan mug", "fuse mug"}
+    assert before == {"scan mug", "fuse mug", "compile fuse"}
     assert "fuse.points: expected at least 5000" in _refusal(fresh, "--config", "fuse={points: 7}")
 
 
