@@ -1,6 +1,7 @@
 """Meshes that a user drops: oriented, repaired, upright, in metres."""
 
 import numpy as np
+import pandas as pd
 import pytest
 import trimesh
 
@@ -61,7 +62,7 @@ def test_flipped_and_doubled_faces_are_mended(tmp_path):
     assert mesh.is_watertight
     assert mesh.is_winding_consistent
     assert mesh.volume > 0
-    cloud = result.cloud
+    cloud = pd.DataFrame(result.cloud)
     inside = np.hypot(cloud.x_m, cloud.y_m) < 0.02
     floor = cloud[inside & (cloud.z_m < 0.02)]
     upper = floor.z_m > 0.001

@@ -4,6 +4,7 @@ import shutil
 
 import numpy as np
 import open3d as o3d
+import pandas as pd
 import pytest
 import trimesh
 
@@ -93,7 +94,7 @@ def test_closed_upright_and_of_the_true_size(case):
 
 
 def test_cloud_is_uniform_and_its_normals_are_true(case):
-    cloud = case.result.cloud
+    cloud = pd.DataFrame(case.result.cloud)
     assert len(cloud) == OPTIONS["n_points"]
     places, normals = artefacts.points(cloud), artefacts.normals(cloud)
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, rtol=1e-9)
@@ -117,7 +118,7 @@ def test_radius_of_the_rim(case):
 
 
 def test_the_unseen_underside_says_so(case):
-    cloud = case.result.cloud
+    cloud = pd.DataFrame(case.result.cloud)
     assert not cloud.seen[cloud.z_m < 1e-6].any()
     assert cloud.seen[cloud.z_m > 0.3 * case.shape.height_m].mean() > 0.97
     assert case.result.report["share_seen"] == pytest.approx(cloud.seen.mean())

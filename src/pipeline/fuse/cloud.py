@@ -1,8 +1,8 @@
 """Evenly spaced points with normals on a fused surface."""
 
 import numpy as np
-import pandas as pd
 
+from pipeline.columns import Columns
 from pipeline.fuse.smoothing import sharpened, vertex_normals
 from pipeline.geometry.sampling import even_points, triangle_areas_and_normals
 
@@ -14,7 +14,7 @@ def cloud(
     n: int,
     fused: bool,
     rng: np.random.Generator,
-) -> pd.DataFrame:
+) -> Columns:
     """Return n points as table `cloud`: normals averaged with their like around where fused, `seen` from the vertices'.
 
     A point's area is that of its share of the surface, projected along its normal: what the noise roughens by adds none.
@@ -28,11 +28,12 @@ def cloud(
         of_vertices = sharpened(of_vertices, triangles)
     normals = (of_vertices[corners] * weights).sum(axis=1)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    frame = pd.DataFrame(np.hstack([points, normals]), columns=["x_m", "y_m", "z_m", "nx", "ny", "nz"])
     projected = np.clip(np.einsum("nc,nc->n", normals, facets[triangle]), 0.0, 1.0)
-    return frame.assign(
-        area_m2=area.sum() / n * projected, seen=(seen[corners] * weights[..., 0]).sum(axis=1) > 0.5
-    )
+    return {
+        **dict(zip(("x_m", "y_m", "z_m", "nx", "ny", "nz"), np.hstack([points, normals]).T, strict=True)),
+        "area_m2": area.sum() / n * projected,
+        "seen": (seen[corners] * weights[..., 0]).sum(axis=1) > 0.5,
+    }
 
 
 def _barycentric(points: np.ndarray, corners: np.ndarray) -> np.ndarray:

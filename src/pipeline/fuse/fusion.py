@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from pipeline.artefacts import Mesh
+from pipeline.columns import Columns
 from pipeline.command import untold
 from pipeline.errors import PipelineError
 from pipeline.fuse import coverage, dropped, layouts, recorded, tsdf
@@ -30,7 +30,7 @@ class Fused:
     """
 
     mesh: Mesh
-    cloud: pd.DataFrame
+    cloud: Columns
     report: dict[str, Any]
     complaints: tuple[str, ...] = ()
 
@@ -78,7 +78,7 @@ def _result(
 ) -> Fused:
     points = cloud(surface.vertices_m, surface.triangles, surface.seen, n_points, was_fused, rng)
     report = {
-        "share_seen": float(points.seen.mean()),
+        "share_seen": float(points["seen"].mean()),
         "watertight": is_closed(surface.triangles),
         "n_triangles": len(surface.triangles),
         "area_m2": float(triangle_areas_and_normals(surface.vertices_m, surface.triangles)[0].sum()),
