@@ -6,7 +6,7 @@
 
 from pipeline.simulate.filling import Filling, fill
 from pipeline.simulate.pouring import Pour, pour
-from pipeline.simulate.rest import holds, particles_for, settle, settle_all
+from pipeline.simulate.rest import holds, keeps, particles_for, settle, settle_all
 from pipeline.simulate.walls import Vessel, vessel
 
 __all__ = [
@@ -15,6 +15,7 @@ __all__ = [
     "Vessel",
     "fill",
     "holds",
+    "keeps",
     "particles_for",
     "pour",
     "settle",

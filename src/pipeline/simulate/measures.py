@@ -95,9 +95,9 @@ def overflow(name: str, vessel: Vessel) -> list[Row]:
 
 
 def _held(check: str, name: str, vessel: Vessel) -> Row:
-    held = liquid.holds(vessel)
+    held = liquid.keeps(vessel)
     capacity_m3 = vessel.cavity.capacity_m3
-    return row(check, name, vessel, held, vessel.lowered, held * vessel.spacing_m**3, capacity_m3)
+    return row(check, name, vessel, round(held), vessel.lowered, held * vessel.spacing_m**3, capacity_m3)
 
 
 def spill_angle(name: str, vessel: Vessel, share: float, seed: int) -> list[Row]:

@@ -32,7 +32,10 @@ _RUNS, _RUNS_OF_MANY, _MANY = (
     4,
     1000,
 )  # top-ups of a trial's liquid; fewer where a vessel holds many, as one counts for less
-_FAR = 0.015  # a share: a mean of one top-up a room that is further from the capacity tells enough
+_FAR, _FAR_AT_LEAST = (
+    0.015,
+    4,
+)  # a share, and particles: a mean of one top-up a room that is further from the capacity tells enough
 _TOP_UPS, _STATES = 8, 5  # in a row; the last ones are kept
 _PORTIONS = 300  # a portion set down at once is this part of the capacity, one particle at least
 _PORTION_S = 0.1
@@ -87,6 +90,11 @@ def holds(vessel: Vessel) -> int:
     return max(len(state) for state in _brimful(vessel))
 
 
+def keeps(vessel: Vessel) -> float:
+    """Return how many particles stay for good when the vessel is filled gently until it overflows: a mean of its states."""
+    return float(np.mean([len(state) for state in _brimful(vessel)]))
+
+
 def overflows_at(vessel: Vessel) -> float:
     """Return how many particles are there just before the first runs over when liquid at rest is topped up: a mean.
 
@@ -96,7 +104,7 @@ def overflows_at(vessel: Vessel) -> float:
     rooms = _ROOMS * ((_RUNS if target < _MANY else _RUNS_OF_MANY) // len(_ROOMS))
     found: list[int] = []
     for turn, room in enumerate(rooms):
-        if turn == len(_ROOMS) and abs(np.mean(found) - target) > _FAR * target:
+        if turn == len(_ROOMS) and abs(np.mean(found) - target) > max(_FAR * target, _FAR_AT_LEAST):
             break
         start = _lowest(states[turn % len(states)], max(target - _scaled(target, room), 1))
         jitter = np.random.default_rng(turn).normal(0.0, _JITTER * vessel.spacing_m, start.shape)
