@@ -78,9 +78,8 @@ def compiled(types: dict[Any, str]) -> list[str]:
     from numba.core.sigutils import normalize_signature
 
     for function, arguments in types.items():
-        function.compile(
-            normalize_signature(arguments)[0]
-        )  # the cache knows a text from the types that it means
+        # Types, not their text: Numba's cache takes them for different keys.
+        function.compile(normalize_signature(arguments)[0])
     return names(*types)
 
 

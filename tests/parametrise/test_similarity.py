@@ -75,7 +75,7 @@ def test_labels_stay_and_parameters_turn_and_scale(name, labels_agree, yaw_rad, 
         name, scale * turned[0] + shift_m, turned[1], scale**2 * here.area_m2
     )
     assert (parts_turned == parts).all(axis=1).mean() >= labels_agree
-    turns(before, there, R)
+    turns(before, there, R, 2e-4 if name == "mug" else 5e-4)
     if name == "mug":
         np.testing.assert_array_equal(parts_elsewhere, parts)
         scales(there, elsewhere, scale, shift_m)
@@ -103,9 +103,9 @@ def scales(there: dict, elsewhere: dict, scale: float, shift_m: np.ndarray) -> N
         )
 
 
-def turns(before: dict, there: dict, R: np.ndarray) -> None:
-    """Assert that what does not depend on the lip is the same after a turn, and that a spout's lip turns with it."""
-    np.testing.assert_allclose(there["opening_m"], R @ before["opening_m"], atol=5e-4)
+def turns(before: dict, there: dict, R: np.ndarray, opening_m: float) -> None:
+    """Assert that only what depends on a level rim's lip changes by a turn; the opening's centre is within `opening_m`."""
+    np.testing.assert_allclose(there["opening_m"], R @ before["opening_m"], atol=opening_m)
     for name in (*SCALARS, "stability_rad"):
         assert there[name] == pytest.approx(before[name], rel=0.01), name
     assert there["spout_depth_m"] == pytest.approx(before["spout_depth_m"], abs=1e-3)

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pipeline.geometry.cavity import TIE_M
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -14,7 +16,6 @@ ORANGE, BLUE, GREEN, PURPLE, GREY = "#D55E00", "#0072B2", "#009E73", "#CC79A7", 
 COLUMNS = 4
 POINTS = 1200
 CUT_MM = 2.5  # half the thickness of the slice that is drawn dark
-SPOUT_MM = 2.0  # rims that are level to within this have no spout
 BESIDE_MM = 9.0  # a spout is less deep than the lip's mark is high: its depth is drawn beside it
 
 Values = dict[str, float]
@@ -166,7 +167,7 @@ def _stability(axis: "Axes", drawn: Drawn) -> None:
 
 def _spout(axis: "Axes", drawn: Drawn) -> None:
     depth = drawn.values["spout_depth_m"] * 1e3
-    if depth > SPOUT_MM:
+    if depth > TIE_M * 1e3:
         along, height = _lip(drawn)
         depth_mm = [height, height + depth]
         look: Any = {"color": ORANGE, "lw": 2.4, "solid_capstyle": "butt", "label": "depth of the spout"}

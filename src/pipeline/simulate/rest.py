@@ -32,10 +32,8 @@ _RUNS, _RUNS_OF_MANY, _MANY = (
     4,
     1000,
 )  # top-ups of a trial's liquid; fewer where a vessel holds many, as one counts for less
-_FAR, _FAR_AT_LEAST = (
-    0.015,
-    4,
-)  # a share, and particles: a mean of one top-up a room that is further from the capacity tells enough
+# A mean of one top-up a room that is further from the capacity tells enough: a share of it, and particles.
+_FAR, _FAR_AT_LEAST = 0.015, 4
 _TOP_UPS, _STATES = 8, 5  # in a row; the last ones are kept
 _PORTIONS = 300  # a portion set down at once is this part of the capacity, one particle at least
 _PORTION_S = 0.1
