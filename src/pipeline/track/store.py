@@ -10,7 +10,7 @@ from typing import Any
 
 from pipeline.command import progress
 from pipeline.track.facts import sha256
-from pipeline.track.logged import log_classifiers
+from pipeline.track.logged import Packages, log_classifiers, packing
 from pipeline.track.runs import Data, File, Run, digest_of
 
 DEFAULT_DATABASE = "mlflow.db"
@@ -23,7 +23,7 @@ _ENVIRONMENT = {
     "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "1",
     "MLFLOW_HTTP_REQUEST_TIMEOUT": "20",
 }
-PARAMS, METRICS = 100, 1000  # in one request, MLflow's own limits
+PARAMS, METRICS = 100, 900  # in one request: MLflow takes 1,000 in all
 TAG_CHARACTERS = 5000
 # Arrow's types in MLflow's words.
 _TYPES = {"double": "double", "float": "float", "int64": "long", "bool": "boolean"}
@@ -98,15 +98,16 @@ class Recorder:
             if run.info.status != "RUNNING":
                 return False
             self._forget(run.info.run_id)  # its writer was stopped on the way
-        call_id = self._begin(call, {"call.digest": digest})
+        call_id = self._begin(call, {"call.digest": digest}, {})
         known = {run.data.tags["fingerprint"] for run in self._known(call)}
         fresh = [run for run in call.nested if not run.fingerprint or run.fingerprint not in known]
-        for run in progress(fresh, len(fresh), "track: runs"):
-            self._end(self._begin(run, {"mlflow.parentRunId": call_id}), run)
+        with packing(run.classifiers for run in fresh if run.classifiers) as packages:
+            for run in progress(fresh, len(fresh), "track: runs"):
+                self._end(self._begin(run, {"mlflow.parentRunId": call_id}, packages), run)
         self._end(call_id, call)
         return True
 
-    def _begin(self, run: Run, tags: dict[str, str]) -> str:
+    def _begin(self, run: Run, tags: dict[str, str], packages: Packages) -> str:
         """Begin a run and write all that it says; return its id."""
         tags = {**run.tags, **tags, **_system_tags(run)}
         info = self.client.create_run(
@@ -114,7 +115,7 @@ class Recorder:
         ).info
         self._record(info.run_id, run)
         self._inputs(info.run_id, run)
-        self._attach(info.run_id, run)
+        self._attach(info.run_id, run, packages)
         return info.run_id
 
     def _end(self, run_id: str, run: Run) -> None:
@@ -127,10 +128,9 @@ class Recorder:
         written_ms = int(run.ended_s * 1000)
         params = [Param(key, str(value)) for key, value in run.params.items()]
         metrics = [Metric(key, value, written_ms, step) for key, value, step in run.metrics]
-        for start in range(0, len(params), PARAMS):
-            self.client.log_batch(run_id, params=params[start : start + PARAMS])
-        for start in range(0, len(metrics), METRICS):
-            self.client.log_batch(run_id, metrics=metrics[start : start + METRICS])
+        while params or metrics:
+            self.client.log_batch(run_id, params=params[:PARAMS], metrics=metrics[:METRICS])
+            params, metrics = params[PARAMS:], metrics[METRICS:]
 
     def _inputs(self, run_id: str, run: Run) -> None:
         from mlflow.entities import Dataset, DatasetInput, InputTag
@@ -142,7 +142,7 @@ class Recorder:
         if inputs:
             self.client.log_inputs(run_id, inputs)
 
-    def _attach(self, run_id: str, run: Run) -> None:
+    def _attach(self, run_id: str, run: Run, packages: Packages) -> None:
         """Attach texts, files and classifiers; a file that is not what it was is named in a tag instead."""
         for name, text in run.texts.items():
             self.client.log_text(run_id, text, name)
@@ -151,7 +151,8 @@ class Recorder:
             if file.path not in changed:
                 self.client.log_artifact(run_id, file.path, file.folder)
         if run.classifiers and _is_same(run.classifiers.file):
-            log_classifiers(self.client, self.experiment_id, run_id, run.classifiers)
+            package = packages[run.classifiers]
+            log_classifiers(self.client, self.experiment_id, run_id, run.classifiers, package)
         elif run.classifiers:
             changed.append(run.classifiers.file.path)
         if changed:
