@@ -42,6 +42,12 @@ def test_the_spheres_at_rest_fill_as_much_as_the_liquid(cup):
         assert 0.45 < share < 0.70
 
 
+def test_balls_at_the_bottom_of_a_deep_cup_are_not_pressed_through_its_floor():
+    deep = prepared.container("deep", *lathe(0.035, 0.130), 0.010, engines.engine("bullet"))
+    full = round(deep.cavity.capacity_m3 / 0.010**3)
+    assert [packing.settled(deep.vessel, n)[1] for n in (round(0.9 * full), full)] == [0, 0]
+
+
 def test_upright_no_sphere_leaves_and_upside_down_all(cup):
     upright, over = pour(cup, N, 0.0), pour(cup, N, 150.0)
     assert (upright.n_left, upright.n_retained, upright.n_leaked) == (0, N, 0)

@@ -15,7 +15,7 @@ from pipeline.geometry.cavity import Cavity
 from pipeline.simulate.fields import Walls
 from pipeline.simulate.forces import Response
 
-SOLVER_ITERATIONS = 10
+SOLVER_ITERATIONS = 20  # with 10 what lies at the bottom of a full jug is pressed through its floor
 DENSITY_KG_M3 = 1000.0
 SPEED_LIMIT = 8.0  # m/s, as for the liquid
 _MARGIN_M = 0.0005  # Bullet's skin about the container's triangles
