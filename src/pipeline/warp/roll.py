@@ -1,4 +1,4 @@
-"""Which way an upright object faces: to its handle, away from its spout, to a corner; or nowhere, when it is round."""
+"""Which way an upright object faces: to its handle, away from its spout, to a corner; or, when it is round, anywhere."""
 
 from dataclasses import dataclass
 
@@ -31,15 +31,29 @@ class Roll:
 def roll(cloud: Cloud, origin_m: np.ndarray, ring_m: np.ndarray) -> Roll:
     """Return the roll of a container about the vertical through its middle (3,), with a rim ring (M, 3).
 
-    Where several directions are equally right, the one nearest to +x is taken.
+    Where several directions are equally right, the one nearest to that in which its own points lean is taken: whichever way the
+    object was turned on the table, it is met in the same way.
     """
+    leaning_rad = _leaning(cloud.points_m)
     found = _handles(cloud, origin_m, ring_m)
     if found:
         alike = [rows for rows in found if len(rows) >= ALIKE * len(found[0])]
         towards = [_horizontal(cloud.points_m[rows].mean(axis=0) - origin_m) for rows in alike]
-        return Roll(max(towards, key=lambda axis: axis[0]), 1, len(found))
-    azimuth_rad, symmetry = outline(ring_m)
-    return Roll(np.array([np.cos(azimuth_rad), np.sin(azimuth_rad), 0.0]), symmetry, 0)
+        leaning = _horizontally(leaning_rad)
+        return Roll(max(towards, key=lambda axis: axis @ leaning), 1, len(found))
+    azimuth_rad, symmetry = outline(ring_m, leaning_rad)
+    return Roll(_horizontally(azimuth_rad), symmetry, 0)
+
+
+def _leaning(points_m: np.ndarray) -> float:
+    """Return the azimuth (rad) of the skewness of points (N, 3) across the vertical: on a round object, of chance alone."""
+    flat = points_m[:, :2] - points_m[:, :2].mean(axis=0)
+    skewness = (flat**2).sum(axis=1) @ flat
+    return float(np.arctan2(skewness[1], skewness[0]))
+
+
+def _horizontally(azimuth_rad: float) -> np.ndarray:
+    return np.array([np.cos(azimuth_rad), np.sin(azimuth_rad), 0.0])
 
 
 def _horizontal(vector: np.ndarray) -> np.ndarray:
@@ -95,14 +109,14 @@ def _outside_wall(cloud: Cloud, rows: np.ndarray, origin_m: np.ndarray, outward:
     return (outward[rows] < -0.5) & np.isfinite(distance_m).any(axis=1)
 
 
-def outline(ring_m: np.ndarray) -> tuple[float, int]:
+def outline(ring_m: np.ndarray, leaning_rad: float) -> tuple[float, int]:
     """Return the azimuth (rad) and the symmetry of a rim seen from above: points (M, 3).
 
-    The azimuth is that of the corner nearest to +x; of a single bulge, a spout, that of the opposite side, where handles are;
-    and 0 on a round rim.
+    The azimuth is that of the corner nearest to `leaning_rad`; of a single bulge, a spout, that of the opposite side, where
+    handles are; and on a round rim `leaning_rad` itself.
     """
     offset = ring_m[:, :2] - _middle(ring_m[:, :2])
-    azimuth = np.arctan2(offset[:, 1], offset[:, 0]) % (2 * np.pi)
+    azimuth = (np.arctan2(offset[:, 1], offset[:, 0]) - leaning_rad) % (2 * np.pi)
     centres = (np.arange(SECTORS) + 0.5) * 2 * np.pi / SECTORS
     sector = np.minimum((azimuth / (2 * np.pi) * SECTORS).astype(int), SECTORS - 1)
     count = np.bincount(sector, minlength=SECTORS)
@@ -110,15 +124,15 @@ def outline(ring_m: np.ndarray) -> tuple[float, int]:
     profile = np.interp(centres, centres[count > 0], mean_m[count > 0], period=2 * np.pi)
     profile = np.mean([np.roll(profile, shift) for shift in (-1, 0, 1)], axis=0) / np.median(profile) - 1.0
     if np.std(profile) < ROUND_SHARE:
-        return 0.0, 0
+        return leaning_rad, 0
     repeats = [m for m in (4, 3, 2) if np.corrcoef(profile, np.roll(profile, SECTORS // m))[0, 1] > REPEATS]
     symmetry = repeats[0] if repeats else 1
     excess = np.maximum(profile, 0.0)
     phase = np.angle(np.sum(excess * np.exp(1j * symmetry * centres))) / symmetry
     if symmetry == 1:
-        return float(phase + np.pi), 1
+        return float(leaning_rad + phase + np.pi), 1
     turns = phase + 2 * np.pi * np.arange(symmetry) / symmetry
-    return float(turns[np.argmax(np.cos(turns).round(9))]), symmetry
+    return float(leaning_rad + turns[np.argmax(np.cos(turns))]), symmetry
 
 
 def _middle(ring_m: np.ndarray) -> np.ndarray:
