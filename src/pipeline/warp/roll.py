@@ -138,8 +138,9 @@ def outline(ring_m: np.ndarray, leaning_rad: float) -> tuple[float, int]:
 def _middle(ring_m: np.ndarray) -> np.ndarray:
     """Return the centre (2,) of the circle that most points (M, 2) lie on: Kåsa's fit, reweighted for least absolute distances."""
     mean_m = ring_m.mean(axis=0)
-    size_m = float(ring_m.std())
-    x = (ring_m - mean_m) / size_m
+    x = ring_m - mean_m
+    size_m = float(x.std())
+    x = x / size_m
     design, right = np.column_stack([2.0 * x, np.ones(len(x))]), (x**2).sum(axis=1)
     weight = np.ones(len(x))
     for _ in range(20):
