@@ -123,6 +123,28 @@ def test_a_bend_brings_pairs_nearer_that_no_factors_do(name):
     assert after < 0.7 * before
 
 
+@pytest.mark.parametrize("name", ["mug", "jug", "espresso_cup"])
+@pytest.mark.parametrize("source", ["tall_cup", "wide_bowl"])
+def test_a_source_without_a_handle_does_not_take_one_for_container(source, name):
+    target = cloud(name)
+    mapped = fit(cloud(source), unseen(target), refinements=5, bends=1).map_labels(1).cloud
+    wall, handle = target.parts[:, 0], target.parts[:, 2]
+    assert mapped.parts[wall, 0].mean() > 0.999
+    # What is left is the stump, less than a twentieth of the radius off the wall.
+    assert mapped.parts[handle].any(axis=1).mean() < 0.2
+
+
+@pytest.mark.parametrize("name", ["square_bowl", "wide_bowl", "tumbler"])
+def test_a_source_without_a_handle_leaves_nothing_out_where_there_is_none(name):
+    mapped = fit(cloud("tall_cup"), unseen(cloud(name)), refinements=5, bends=1).map_labels(1).cloud
+    assert mapped.parts[:, 0].mean() > 0.999
+
+
+def unseen(target: Cloud) -> Cloud:
+    """Return a target as a source without a handle sees it: all is container."""
+    return replace(target, parts=target.parts & [True, True, False] | [True, False, False])
+
+
 def test_neighbours_across_the_wall_are_passed_over():
     # A wall of 3 mm: the nearest point is on the other side, and a hundred more are.
     inner = np.column_stack([np.zeros(200), np.linspace(0, 0.1, 200), np.zeros(200)])

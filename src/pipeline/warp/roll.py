@@ -70,11 +70,7 @@ def _handles(cloud: Cloud, origin_m: np.ndarray, ring_m: np.ndarray) -> list[np.
     pieces = [rows for rows in pieces if len(rows) >= HANDLE_MIN_SHARE * len(cloud.points_m)]
     if not pieces:
         return []
-    radial = (cloud.points_m - origin_m)[:, :2]
-    radius_m = np.linalg.norm(radial, axis=1)
-    outward = np.einsum("nc,nc->n", radial, cloud.normals[:, :2]) / np.maximum(radius_m, 1e-9)
-    body_m = _body_radius(cloud.points_m[:, 2], radius_m, outward > 0.5)
-    off = radius_m > (1.0 + GAP) * body_m
+    off, outward = standing_off(cloud, origin_m)
     rim_low_m = np.quantile(ring_m[:, 2], 0.02)
     found = []
     for rows in pieces:
@@ -83,6 +79,17 @@ def _handles(cloud: Cloud, origin_m: np.ndarray, ring_m: np.ndarray) -> list[np.
         if np.mean(off[rows]) > STANDS_OFF and (loops or below):
             found.append(rows[off[rows]])
     return sorted(found, key=len, reverse=True)
+
+
+def standing_off(cloud: Cloud, origin_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return which points (N,) lie outside the body about the vertical through its middle (3,), as a handle's do, and how much
+    each faces away from that (N,): the cosine.
+    """
+    radial = (cloud.points_m - origin_m)[:, :2]
+    radius_m = np.linalg.norm(radial, axis=1)
+    outward = np.einsum("nc,nc->n", radial, cloud.normals[:, :2]) / np.maximum(radius_m, 1e-9)
+    body_m = _body_radius(cloud.points_m[:, 2], radius_m, outward > 0.5)
+    return radius_m > (1.0 + GAP) * body_m, outward
 
 
 def _body_radius(height_m: np.ndarray, radius_m: np.ndarray, outside: np.ndarray) -> np.ndarray:
