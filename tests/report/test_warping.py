@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.report.warping import numbers
-from pipeline.report.warping_page import MEASURES, bars_met, matrices, over_targets, overview
+from pipeline.report.warping_page import COLUMNS, MEASURES, bars_met, matrices, over_targets, overview
 
 ASKED = [key for key, measure in MEASURES.items() if measure.bar is not None]
 
@@ -62,3 +62,10 @@ def test_the_matrices_have_every_target_and_a_dash_where_there_is_no_number():
     rim = figure.axes[list(MEASURES).index("rim_iou")]
     assert [text.get_text() for text in rim.texts] == ["1.00", "1.00", "1.00", "0.00"]
     assert rim.get_ylim() == pytest.approx((2, 0))
+
+
+def test_the_matrices_stand_in_even_rows():
+    figure = matrices(found())
+    figure.canvas.draw()
+    first, second, third = (figure.axes[row * COLUMNS].get_position() for row in range(3))
+    assert second.y0 - third.y1 == pytest.approx(first.y0 - second.y1, abs=0.01)

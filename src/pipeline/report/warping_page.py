@@ -173,6 +173,10 @@ def matrices(found: Scores) -> "Figure":
             axis.set_axis_off()
         for axis in axes.flat[len(MEASURES) - COLUMNS : len(MEASURES)]:
             axis.tick_params(labelbottom=True)
+            for label in axis.get_xticklabels():
+                label.set_in_layout(
+                    axis in axes[-1]
+                )  # above an empty panel they hang into it: no gap between the rows
         figure.suptitle(
             "Every target by itself; the darker, the worse; –: there is no such number", fontsize=9
         )

@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.geometry import frames
 from pipeline.warp import splines
 from pipeline.warp.alignment import PartFrame, part_frame, scale
-from pipeline.warp.clouds import Cloud, thinned
+from pipeline.warp.clouds import Cloud, subset, thinned
 from pipeline.warp.deformation import Chain, Deformation, Kernels, PartStretch
 from pipeline.warp.stretch import Stretch, between_extents, linear
 from pipeline.warp.warp import Warp, label_pairs, point_pairs
@@ -15,6 +15,7 @@ from pipeline.warp.warp import Warp, label_pairs, point_pairs
 NAME = "nearest_neighbour"
 REFINEMENT_POINTS = 4000
 BEND_CENTRES, BEND_STIFFNESS = 150, 1e-3
+TRIMS = 3  # fits to a target without what the source cannot know
 
 
 def fit(
@@ -28,14 +29,23 @@ def fit(
     target that the source fits as well at another size is the same thing at that size, and its rim is scaled, too.
     With bends, which the paper does not have either, a thin-plate spline then takes the pairs to each other: no factors
     make a bowl of a mug.
+    A source without a handle knows of none: what it cannot know of the target (`Warp.is_known`) is left out.
     """
+    warp = _fitted(source, target, refinements, bends)
+    for _ in range(0 if source.parts[:, 2].any() else TRIMS):
+        trimmed = subset(target, np.flatnonzero(warp.is_known))
+        warp = replace(_fitted(source, trimmed, refinements, bends), target=target)
+    return replace(warp, diagnostics={"refinements": float(refinements), "bends": float(bends)})
+
+
+def _fitted(source: Cloud, target: Cloud, refinements: int, bends: int) -> Warp:
     warp = coarse(source, target)
     if refinements:
         warp = _refine(warp, refinements)
     stretched = warp.deformation
     for _ in range(bends):
         warp = replace(warp, deformation=Chain(stretched, _bend(warp, stretched)))
-    return replace(warp, diagnostics={"refinements": float(refinements), "bends": float(bends)})
+    return warp
 
 
 def _refine(warp: Warp, refinements: int) -> Warp:

@@ -1,4 +1,4 @@
-"""Which way an upright object faces: to its handle, away from its spout, to a corner; or nowhere, when it is round."""
+"""Which way an upright object faces: to its handle, away from its spout, to a corner; or, when it is round, anywhere."""
 
 from dataclasses import dataclass
 
@@ -31,15 +31,29 @@ class Roll:
 def roll(cloud: Cloud, origin_m: np.ndarray, ring_m: np.ndarray) -> Roll:
     """Return the roll of a container about the vertical through its middle (3,), with a rim ring (M, 3).
 
-    Where several directions are equally right, the one nearest to +x is taken.
+    Where several directions are equally right, the one nearest to that in which its own points lean is taken: whichever way the
+    object was turned on the table, it is met in the same way.
     """
+    leaning_rad = _leaning(cloud.points_m)
     found = _handles(cloud, origin_m, ring_m)
     if found:
         alike = [rows for rows in found if len(rows) >= ALIKE * len(found[0])]
         towards = [_horizontal(cloud.points_m[rows].mean(axis=0) - origin_m) for rows in alike]
-        return Roll(max(towards, key=lambda axis: axis[0]), 1, len(found))
-    azimuth_rad, symmetry = outline(ring_m)
-    return Roll(np.array([np.cos(azimuth_rad), np.sin(azimuth_rad), 0.0]), symmetry, 0)
+        leaning = _horizontally(leaning_rad)
+        return Roll(max(towards, key=lambda axis: axis @ leaning), 1, len(found))
+    azimuth_rad, symmetry = outline(ring_m, leaning_rad)
+    return Roll(_horizontally(azimuth_rad), symmetry, 0)
+
+
+def _leaning(points_m: np.ndarray) -> float:
+    """Return the azimuth (rad) of the skewness of points (N, 3) across the vertical: on a round object, of chance alone."""
+    flat = points_m[:, :2] - points_m[:, :2].mean(axis=0)
+    skewness = (flat**2).sum(axis=1) @ flat
+    return float(np.arctan2(skewness[1], skewness[0]))
+
+
+def _horizontally(azimuth_rad: float) -> np.ndarray:
+    return np.array([np.cos(azimuth_rad), np.sin(azimuth_rad), 0.0])
 
 
 def _horizontal(vector: np.ndarray) -> np.ndarray:
@@ -56,11 +70,7 @@ def _handles(cloud: Cloud, origin_m: np.ndarray, ring_m: np.ndarray) -> list[np.
     pieces = [rows for rows in pieces if len(rows) >= HANDLE_MIN_SHARE * len(cloud.points_m)]
     if not pieces:
         return []
-    radial = (cloud.points_m - origin_m)[:, :2]
-    radius_m = np.linalg.norm(radial, axis=1)
-    outward = np.einsum("nc,nc->n", radial, cloud.normals[:, :2]) / np.maximum(radius_m, 1e-9)
-    body_m = _body_radius(cloud.points_m[:, 2], radius_m, outward > 0.5)
-    off = radius_m > (1.0 + GAP) * body_m
+    off, outward = standing_off(cloud, origin_m)
     rim_low_m = np.quantile(ring_m[:, 2], 0.02)
     found = []
     for rows in pieces:
@@ -69,6 +79,17 @@ def _handles(cloud: Cloud, origin_m: np.ndarray, ring_m: np.ndarray) -> list[np.
         if np.mean(off[rows]) > STANDS_OFF and (loops or below):
             found.append(rows[off[rows]])
     return sorted(found, key=len, reverse=True)
+
+
+def standing_off(cloud: Cloud, origin_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return which points (N,) lie outside the body about the vertical through its middle (3,), as a handle's do, and how much
+    each faces away from that (N,): the cosine.
+    """
+    radial = (cloud.points_m - origin_m)[:, :2]
+    radius_m = np.linalg.norm(radial, axis=1)
+    outward = np.einsum("nc,nc->n", radial, cloud.normals[:, :2]) / np.maximum(radius_m, 1e-9)
+    body_m = _body_radius(cloud.points_m[:, 2], radius_m, outward > 0.5)
+    return radius_m > (1.0 + GAP) * body_m, outward
 
 
 def _body_radius(height_m: np.ndarray, radius_m: np.ndarray, outside: np.ndarray) -> np.ndarray:
@@ -95,14 +116,14 @@ def _outside_wall(cloud: Cloud, rows: np.ndarray, origin_m: np.ndarray, outward:
     return (outward[rows] < -0.5) & np.isfinite(distance_m).any(axis=1)
 
 
-def outline(ring_m: np.ndarray) -> tuple[float, int]:
+def outline(ring_m: np.ndarray, leaning_rad: float) -> tuple[float, int]:
     """Return the azimuth (rad) and the symmetry of a rim seen from above: points (M, 3).
 
-    The azimuth is that of the corner nearest to +x; of a single bulge, a spout, that of the opposite side, where handles are;
-    and 0 on a round rim.
+    The azimuth is that of the corner nearest to `leaning_rad`; of a single bulge, a spout, that of the opposite side, where
+    handles are; and on a round rim `leaning_rad` itself.
     """
     offset = ring_m[:, :2] - _middle(ring_m[:, :2])
-    azimuth = np.arctan2(offset[:, 1], offset[:, 0]) % (2 * np.pi)
+    azimuth = (np.arctan2(offset[:, 1], offset[:, 0]) - leaning_rad) % (2 * np.pi)
     centres = (np.arange(SECTORS) + 0.5) * 2 * np.pi / SECTORS
     sector = np.minimum((azimuth / (2 * np.pi) * SECTORS).astype(int), SECTORS - 1)
     count = np.bincount(sector, minlength=SECTORS)
@@ -110,22 +131,23 @@ def outline(ring_m: np.ndarray) -> tuple[float, int]:
     profile = np.interp(centres, centres[count > 0], mean_m[count > 0], period=2 * np.pi)
     profile = np.mean([np.roll(profile, shift) for shift in (-1, 0, 1)], axis=0) / np.median(profile) - 1.0
     if np.std(profile) < ROUND_SHARE:
-        return 0.0, 0
+        return leaning_rad, 0
     repeats = [m for m in (4, 3, 2) if np.corrcoef(profile, np.roll(profile, SECTORS // m))[0, 1] > REPEATS]
     symmetry = repeats[0] if repeats else 1
     excess = np.maximum(profile, 0.0)
     phase = np.angle(np.sum(excess * np.exp(1j * symmetry * centres))) / symmetry
     if symmetry == 1:
-        return float(phase + np.pi), 1
+        return float(leaning_rad + phase + np.pi), 1
     turns = phase + 2 * np.pi * np.arange(symmetry) / symmetry
-    return float(turns[np.argmax(np.cos(turns).round(9))]), symmetry
+    return float(leaning_rad + turns[np.argmax(np.cos(turns))]), symmetry
 
 
 def _middle(ring_m: np.ndarray) -> np.ndarray:
     """Return the centre (2,) of the circle that most points (M, 2) lie on: Kåsa's fit, reweighted for least absolute distances."""
     mean_m = ring_m.mean(axis=0)
-    size_m = float(ring_m.std())
-    x = (ring_m - mean_m) / size_m
+    x = ring_m - mean_m
+    size_m = float(x.std())
+    x = x / size_m
     design, right = np.column_stack([2.0 * x, np.ones(len(x))]), (x**2).sum(axis=1)
     weight = np.ones(len(x))
     for _ in range(20):

@@ -10,6 +10,9 @@ from pipeline.warp.alignment import PartFrame
 from pipeline.warp.clouds import Cloud, Mapped, subset
 from pipeline.warp.deformation import Deformation
 from pipeline.warp.nearest import agreeing_neighbours, majority_of_neighbours, mean_of_neighbours
+from pipeline.warp.roll import standing_off
+
+FAR = 0.1  # from here on, in spreads of the container, nothing of the source is near
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,18 @@ class Warp:
     def has_counterpart(self) -> np.ndarray:
         """Which of the source's points (N,) the target can have, too: all but a handle's, where no handle was found."""
         return ~self.source.parts[:, 2] | (self.target_frame.handles > 0)
+
+    @property
+    def is_known(self) -> np.ndarray:
+        """Which of the target's points (M,) the source can have, too.
+
+        All, where it has a handle itself; else what stands off the target's body far from all of the source is that of the target.
+        """
+        if self.source.parts[:, 2].any():
+            return np.ones(len(self.target.points_m), dtype=bool)
+        off, _ = standing_off(self.target, self.target_frame.T_object_part[:3, 3])
+        spread_m = np.linalg.norm(self.target_frame.spread_m)
+        return ~(off & (label_pairs(self, 1)[1][:, 0] > FAR * spread_m))
 
     @property
     def source_index(self) -> np.ndarray:
@@ -114,7 +129,7 @@ class Warp:
         The paper's label mapping.
         """
         index, distance = label_pairs(self, k)
-        parts = majority_of_neighbours(self.aligned.parts, index)
+        parts = majority_of_neighbours(self.aligned.parts, index) & self.is_known[:, None]
         cloud = replace(self.target, parts=parts)
         return Mapped(cloud, index[:, 0], np.arange(len(parts)), index[:, 0] >= 0, distance[:, 0])
 
