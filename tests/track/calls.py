@@ -108,8 +108,12 @@ def track(folder: Path, *arguments: str, **environment: str) -> subprocess.Popen
 
 
 def end(folder: Path, status: str, since_s: float, **environment: str) -> tuple[int, str, str]:
-    """Record the end of a call as the workflow does; return exit code, stdout, and stderr without its progress."""
-    job = start_end(folder, status, since_s, **environment)
+    """Record the end of a call as the workflow does; return what `told` does."""
+    return told(start_end(folder, status, since_s, **environment))
+
+
+def told(job: subprocess.Popen) -> tuple[int, str, str]:
+    """Wait for a process; return exit code, stdout, and stderr without the progress that a busy machine is told of."""
     out, err = job.communicate()
     lines = [line for line in err.splitlines(keepends=True) if not line.startswith("track: runs")]
     return job.returncode, out, "".join(lines)

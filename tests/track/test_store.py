@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 import pytest
-from track.calls import OBJECTS, end, leave, track
+from track.calls import OBJECTS, end, leave, told, track
 
 from pipeline.track.store import client
 
@@ -94,15 +94,13 @@ def test_the_data_of_a_run_can_be_read_from_its_source(tracked):
 def test_a_lost_store_is_told_again_with_the_same_runs(again):
     before = _said(again)
     (again / "mlflow.db").unlink()
-    job = track(again, "again")
-    assert job.communicate() == ("1 calls recorded, 0 were there already\n", "")
+    assert told(track(again, "again")) == (0, "1 calls recorded, 0 were there already\n", "")
     assert _said(again) == before
 
 
 def test_a_call_that_is_there_is_not_told_twice(again):
     before = _said(again)
-    job = track(again, "again")
-    assert job.communicate() == ("0 calls recorded, 1 were there already\n", "")
+    assert told(track(again, "again")) == (0, "0 calls recorded, 1 were there already\n", "")
     assert _said(again) == before
 
 
