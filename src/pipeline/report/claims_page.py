@@ -26,10 +26,10 @@ def claims_page(claims: "pd.DataFrame") -> "Figure":
         figure.suptitle("The paper's claims", y=0.975, fontsize=10)
         columns = {
             "the paper says": 0.05,
-            "here": 0.40,
-            "95 % interval": 0.66,
-            "holds": 0.77,
-            "why, where it does not": 0.84,
+            "here": 0.35,
+            "95 % interval": 0.58,
+            "holds": 0.69,
+            "why, where it does not": 0.76,
         }
         y = 0.945
         for word, x in columns.items():
@@ -38,11 +38,11 @@ def claims_page(claims: "pd.DataFrame") -> "Figure":
         for row in claims.itertuples():
             holds = ("yes" if row.holds else "no") + ("" if row.sure else " (not sure)")
             cells = [
-                (0.05, textwrap.wrap(f"{row.section}: {row.words}", 58)),
-                (0.40, [*textwrap.wrap(row.measure, 42), f"{row.value:.4f}"]),
-                (0.66, [f"{row.low:.4f} to", f"{row.high:.4f}"] if row.low != row.high else ["–"]),
-                (0.77, textwrap.wrap(holds, 11)),
-                (0.84, textwrap.wrap(row.why, 27)),
+                (0.05, textwrap.wrap(f"{row.section}: {row.words}", 50)),
+                (0.35, [*textwrap.wrap(row.measure, 38), _signed(row.value)]),
+                (0.58, [f"{_signed(row.low)} to", _signed(row.high)] if row.low != row.high else ["–"]),
+                (0.69, textwrap.wrap(holds, 11)),
+                (0.76, textwrap.wrap(row.why, 38)),
             ]
             for x, lines in cells:
                 figure.text(x, y, "\n".join(lines), fontsize=6, va="top", linespacing=1.2)
@@ -50,3 +50,7 @@ def claims_page(claims: "pd.DataFrame") -> "Figure":
             figure.add_artist(plt.Line2D([0.05, 0.97], [y + 0.005] * 2, lw=0.3, color="#BBBBBB"))
         figure.text(0.05, y - 0.012, NOTE, fontsize=6.5, va="top")
     return figure
+
+
+def _signed(value: float) -> str:
+    return f"{value:.4f}".replace("-", "−")
