@@ -8,6 +8,8 @@ from pathlib import Path
 # "Error in rule fuse:", then indented lines, of which "log: a.log, b.log (check log file(s) for error details)" is one.
 _FAILED = re.compile(r"^Error in rule (?P<rule>\w+):\n(?P<body>(?:    .*\n)*)", re.MULTILINE)
 _LOGS = re.compile(r"^    log: (?P<logs>.*?)(?: \(check log file.*)?$", re.MULTILINE)
+# A line of `command.progress` or `command.steps`: no reason why a job ended.
+_PROGRESS = re.compile(r".*\((?:[\d.]+/s, \d+ s left|step \d+ of \d+, \d+ s so far)\)")
 LONGEST_CHARACTERS = 65536
 
 
@@ -48,4 +50,9 @@ def text(path: str | Path) -> str:
 def _reason(logs: tuple[str, ...]) -> str:
     lines = [line.strip() for path in logs for line in text(path).splitlines() if line.strip()]
     said = [line for line in lines if line.startswith("error: ")]
-    return (said or lines or ["no log"])[-1]
+    reason = (said or lines or ["no log"])[-1]
+    return (
+        f"ended without an error, as when it is killed, after: {reason}"
+        if _PROGRESS.fullmatch(reason)
+        else reason
+    )
