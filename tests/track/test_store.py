@@ -152,10 +152,17 @@ def test_a_failed_call_has_the_rule_its_log_and_no_result_of_an_earlier_one(tmp_
     assert parent.data.tags["failed.rule"] == "fuse"
     assert "found y" in parent.data.tags["mlflow.note.content"]
     assert "simulate.pouring.leaked" not in parent.data.metrics
+    assert "classify.pouring.standard.novel.auc_by_samples" not in parent.data.metrics
     assert [run.info.status for run in _runs(folder, "stage")[1]] == ["FAILED"]
     assert _runs(folder, "classifier")[1] == []
     logs = store.list_artifacts(parent.info.run_id, "failed/logs/fuse")
     assert [item.path for item in logs] == ["failed/logs/fuse/mug.log"]
+
+
+def test_learning_curves_are_curves_of_the_call(tracked):
+    store, (parent,) = _runs(tracked, "call")
+    curve = store.get_metric_history(parent.info.run_id, "classify.pouring.standard.novel.auc_by_samples")
+    assert [(point.step, point.value) for point in curve] == [(10, 0.7), (50, 0.8), (500, 0.9)]
 
 
 @pytest.mark.parametrize("uri", ["nonsense://nowhere", "http://127.0.0.1:9"])
