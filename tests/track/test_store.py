@@ -165,6 +165,16 @@ def test_learning_curves_are_curves_of_the_call(tracked):
     assert [(point.step, point.value) for point in curve] == [(10, 0.7), (50, 0.8), (500, 0.9)]
 
 
+def test_a_call_that_its_user_stopped_says_so(tmp_path):
+    folder = leave(tmp_path)
+    (folder / "call.log").write_text(
+        f"Terminating processes on user request, this might take some time.\n{FAILED}"
+    )
+    assert end(folder, "failed", time.time() + 60) == (0, "", "")
+    note = _runs(folder, "call")[1][0].data.tags["mlflow.note.content"]
+    assert note.startswith("Stopped by its user, while there ran:\n- `fuse`: ended without a word")
+
+
 @pytest.mark.parametrize("uri", ["nonsense://nowhere", "http://127.0.0.1:9"])
 def test_a_store_that_cannot_be_reached_costs_one_warning_and_is_told_later(tmp_path, uri):
     folder = leave(tmp_path)

@@ -9,7 +9,7 @@ from typing import Any
 
 from pipeline.track import facts
 from pipeline.track.executed import executed_runs
-from pipeline.track.failures import Failure, failures, text
+from pipeline.track.failures import Failure, failures, stopped, text
 from pipeline.track.runs import Data, File, Run
 from pipeline.track.stages import failure_tags, jobs, spent, stage_runs
 from pipeline.track.trained import learning_curves, trained_runs
@@ -103,4 +103,5 @@ def _note(call: Call, failed: list[Failure]) -> str:
     if call.status == "success":
         return objects
     lines = [f"- `{failure.rule}`: {failure.reason} ({', '.join(failure.logs)})" for failure in failed]
-    return "\n".join(["Failed:", *(lines or ["- no job failed: the call was stopped"]), "", objects])
+    head = "Stopped by its user, while there ran:" if stopped(call.logs) else "Failed:"
+    return "\n".join([head, *(lines or ["- no job failed: the call was stopped"]), "", objects])
