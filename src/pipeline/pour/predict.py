@@ -42,12 +42,14 @@ def call(options: argparse.Namespace) -> dict:
     name, learnt = project.check(options.object), project.check(options.learnt_from or source)
     project.made(f"parametrise/{source}/parameters.parquet")
     predictor = Predictor(project.processed, source, mapping=options.mapping, training_object=learnt)
-    second = project.check(options.into) if options.into else _alone(options)
+    second = project.check(options.into) if options.into else None
+    if second is None:
+        _check_alone(options)
     found = _asked(predictor, name, second, options)
     return {"object": name, "into": second, **asdict(found)}
 
 
-def _alone(options: argparse.Namespace) -> None:
+def _check_alone(options: argparse.Namespace) -> None:
     """Refuse what is said of a second container when there is none: it would change nothing."""
     of_second = ("into_fill", "along", "across", "height")
     for name in of_second:

@@ -11,12 +11,12 @@ if TYPE_CHECKING:
 
 NOTE = (
     "Intervals are a bootstrap's over objects; not sure: the interval has both answers. Areas nearer than 0.01 count as alike.\n"
-    "Section IV-B, the robot, is not told by these trials."
+    "Section IV-B, the robot: reports/execution.pdf."
 )
 
 
-def claims_page(claims: "pd.DataFrame") -> "Figure":
-    """Return the page of the paper's claims as a table."""
+def claims_page(claims: "pd.DataFrame", note: str = NOTE) -> "Figure":
+    """Return the page of the paper's claims as a table; `note` stands below."""
     import textwrap
 
     import matplotlib.pyplot as plt
@@ -48,7 +48,7 @@ def claims_page(claims: "pd.DataFrame") -> "Figure":
                 figure.text(x, y, "\n".join(lines), fontsize=6, va="top", linespacing=1.2)
             y -= 0.0108 * max(len(lines) for _, lines in cells) + 0.010
             figure.add_artist(plt.Line2D([0.05, 0.97], [y + 0.005] * 2, lw=0.3, color="#BBBBBB"))
-        figure.text(0.05, y - 0.012, NOTE, fontsize=6.5, va="top")
+        figure.text(0.05, y - 0.012, note, fontsize=6.5, va="top")
     return figure
 
 
