@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -80,15 +82,15 @@ def test_halves_are_scored_apart():
     }
 
 
-def areas() -> pd.DataFrame:
-    """Return areas of each object on each: 0.99 on itself, 0.9 on the next, 0.8 on the one after."""
+def areas(names: list[str] = NAMES) -> pd.DataFrame:
+    """Return areas of each object on each: 0.99 on itself, 0.9 on the next, 0.8 on the one after, and so on."""
     return pd.DataFrame(
         [
             {"experiment": "pouring", "features": name, "training_object": a, "test_object": b}
             | {"auc": (0.99, 0.9, 0.8)[(place - row) % 3]}
             for name in SETS
-            for row, a in enumerate(NAMES)
-            for place, b in enumerate(NAMES)
+            for row, a in enumerate(names)
+            for place, b in enumerate(names)
         ]
     )
 
@@ -129,6 +131,19 @@ def test_the_learning_page_draws_what_its_legend_shows_and_tells_how_fits_went()
     assert any("600 fits: 99.5% converged, after 9 iterations" in text for text in texts(page))
     assert any("3 training sets of one outcome" in text for text in texts(page))
     assert page.axes[0].get_title() == "Pouring, novel objects (hydrostatics 0.900)"
+
+
+def test_numbers_of_forty_objects_stay_in_their_cells():
+    pairs = areas([f"cup_{number}" for number in range(40)])
+    figure = matrices_page(pairs, ["pouring", "filling"], by.object_numbers(pairs, object_weights(40, 20, 0)))
+    figure.canvas.draw()
+    axis = figure.axes[0]
+    cell = axis.get_window_extent().width / 40
+    numbers = [text for text in axis.texts if text.get_ha() == "center"]
+    assert len(numbers) == 41 * 40
+    assert max(text.get_window_extent().width for text in numbers) < cell
+    beside = [text.get_window_extent() for text in axis.texts if text.get_ha() != "center"]
+    assert all(above.y0 > below.y1 - 1 for above, below in pairwise(beside))
 
 
 @pytest.mark.parametrize("page", ["scores", "matrices", "claims"])

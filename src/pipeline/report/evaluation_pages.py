@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 A4 = (8.27, 11.69)
+LEGIBLE = 12  # objects of which a matrix' cells hold their numbers on A4
 SMALL: Any = {
     **RC,
     "font.size": 7,
@@ -170,8 +171,13 @@ def matrices_page(pairs: "pd.DataFrame", experiments: list[str], numbers: Mappin
 
     names = list(dict.fromkeys(pairs["training_object"]))
     with plt.rc_context(SMALL):
-        figure, axes = plt.subplots(3, len(experiments), figsize=A4, squeeze=False)
-        figure.subplots_adjust(left=0.12, right=0.91, top=0.93, bottom=0.13, hspace=0.58, wspace=0.6)
+        # Cells and letters keep their size: with many objects it is the paper that grows.
+        grown = max(1.0, len(names) / LEGIBLE)
+        size = A4[0] * grown, A4[1] * grown
+        figure, axes = plt.subplots(3, len(experiments), figsize=size, squeeze=False)
+        left, right, top, bottom = (edge / grown for edge in (0.12, 0.09, 0.07, 0.13))
+        figure.subplots_adjust(left=left, right=1 - right, top=1 - top, bottom=bottom)
+        figure.subplots_adjust(hspace=0.58 / grown, wspace=0.6 / grown)
         for column, experiment in enumerate(experiments):
             of_experiment = pairs[pairs["experiment"] == experiment]
             for row, features in enumerate(SETS[:3]):
@@ -179,8 +185,9 @@ def matrices_page(pairs: "pd.DataFrame", experiments: list[str], numbers: Mappin
                 _matrix(axis, of_experiment, features, names)
                 _means(axis, f"evaluation.{experiment}.{features}", names, numbers)
                 axis.set_title(f"{experiment.capitalize()}, {WORDS[features]}")
-        figure.suptitle("Area under the curve, training object by test object", y=0.975, fontsize=10)
-        figure.text(0.06, 0.012, MATRIX_NOTE, fontsize=6.5)
+        title = "Area under the curve, training object by test object"
+        figure.suptitle(title, y=1 - 0.025 / grown, fontsize=10)
+        figure.text(0.06 / grown, 0.012 / grown, MATRIX_NOTE, fontsize=6.5)
     return figure
 
 
