@@ -1,5 +1,6 @@
 """Noisy samples of the demonstration objects' true surfaces, for stages that work on clouds."""
 
+import signal
 import sys
 from functools import cache
 
@@ -12,6 +13,10 @@ from pipeline.geometry.sampling import even_points, triangle_areas_and_normals
 from pipeline.scan.shapes import shape
 
 PARTS = ["container", "rim", "handle"]
+
+# A shell's background job ignores Ctrl-C and so would each program that a test starts and stops by it.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @cache

@@ -1,6 +1,8 @@
 """Columns of a table between Arrow and NumPy without pandas, which takes longer to load than most stages' tables to read.
 
-Arrow's own conversions load pandas wherever it is installed; buffers do not. Numbers, truths and words, no lists.
+Arrow's own conversions, `pa.array` of a list too, load pandas wherever it is installed: 0.17 s of processor time in each of a run's
+jobs that read or write a table (those of `label` take 0.42 s, those of `warp` 0.69 s). Buffers do not.
+Numbers, truths and words, no lists.
 """
 
 from collections.abc import Mapping, Sequence

@@ -18,6 +18,8 @@ def serving(project, *arguments):
     with subprocess.Popen(command(project, *arguments, "--no-browser", "--json"), **pipes) as process:
         try:
             said = process.stderr.readline()
+            # Only a page that can close says that it is closed there.
+            assert ("closed there" in said) == (arguments[0] == "annotate")
             yield re.match(r"http://127\.0\.0\.1:\d+/", said)[0], process
         finally:
             process.kill()

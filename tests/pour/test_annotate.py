@@ -112,6 +112,16 @@ def test_the_brush_paints_what_is_seen_and_not_the_far_wall(browser, project):
     assert np.hypot(*painted[:, :2].T).min() > 0.0385  # the outer side of a wall of 4 mm
 
 
+def test_every_tool_is_in_reach_on_a_phone(browser, project):
+    with serving(project, "annotate", "mug") as (url, _), opened(browser, url, 390, 740) as tab:
+        tab.page.wait_for_selector("body[data-ready]")
+        ends = tab.page.evaluate(
+            "Array.from(document.querySelectorAll('button'), b => b.getBoundingClientRect().right)"
+        )
+        assert len(ends) > 8
+        assert max(ends) <= 390
+
+
 def test_nothing_is_saved_before_container_and_rim_are_painted(browser, project):
     with serving(project, "annotate", "mug") as (url, process), opened(browser, url, 800, 560) as tab:
         tab.page.wait_for_selector("body[data-ready]")

@@ -80,7 +80,12 @@ def test_what_nothing_was_learnt_of_is_said(project, capsys):
         (["mugg", "--fill", "60%", "--tilt", "45"], "did you mean 'mug'"),
         (["mug", "--fill", "60", "--tilt", "45"], "expected a number with a unit"),
         (["mug", "--fill", "400ml", "--tilt", "45"], "which are 300 ml"),
-        (["mug", "--fill", "60%", "--tilt", "200"], "from 0 to 180 degrees"),
+        (["mug", "--fill", "60%", "--tilt", "200"], "from 0 to 180 degrees, found 200"),
+        (
+            ["mug", "--fill", "60%", "--tilt", "45", "--along", "2cm"],
+            "--along 2cm: expected a second container",
+        ),
+        (["mug", "--fill", "60%", "--tilt", "45", "--into-fill", "0%"], "--into-fill 0%: expected a second"),
         (["mug", "--fill", "60%", "--tilt", "45", "--into", "mug"], "another object than the cup"),
     ],
 )

@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -80,6 +82,84 @@ def test_halves_are_scored_apart():
     }
 
 
+def areas(names: list[str] = NAMES) -> pd.DataFrame:
+    """Return areas of each object on each: 0.99 on itself, 0.9 on the next, 0.8 on the one after, and so on."""
+    return pd.DataFrame(
+        [
+            {"experiment": "pouring", "features": name, "training_object": a, "test_object": b}
+            | {"auc": (0.99, 0.9, 0.8)[(place - row) % 3]}
+            for name in SETS
+            for row, a in enumerate(names)
+            for place, b in enumerate(names)
+        ]
+    )
+
+
+def test_each_object_has_its_mean_over_the_others_as_trainer_and_as_test():
+    pairs = areas()
+    pairs.loc[pairs["test_object"] == "mug", "auc"] = 0.6
+    numbers = by.object_numbers(pairs, WEIGHTS)
+    head = "evaluation.pouring.standard"
+    assert numbers[f"{head}.trained_on.cup.auc"] == pytest.approx((0.9 + 0.6) / 2)
+    assert numbers[f"{head}.trained_on.cup.auc.low"] == pytest.approx(0.6)  # a replicate without the bowl
+    assert numbers[f"{head}.trained_on.cup.auc.high"] == pytest.approx(0.9)
+    assert numbers[f"{head}.tested_on.mug.auc"] == pytest.approx(0.6)
+    assert len(numbers) == 3 * 2 * 3 * len(SETS)
+
+
+def texts(figure) -> list[str]:
+    """Return all texts of a figure's axes and margins."""
+    return [text.get_text() for text in (*figure.texts, *(t for axis in figure.axes for t in axis.texts))]
+
+
+def test_both_warped_sets_are_tested_against_the_standard_one_on_the_page():
+    table = replicates()
+    table.loc[table["features"] == "point_mapping", "auc"] -= 0.05
+    page = scores_page(by.score_numbers(by.by_name(table)), ["pouring"], {})
+    said = [text for text in texts(page) if text.startswith("Δ")]
+    assert [text.split()[1] for text in said[:2]] == ["+0.200", "+0.150"]
+
+
+def test_the_learning_page_draws_what_its_legend_shows_and_tells_how_fits_went():
+    numbers = by.score_numbers(by.by_name(replicates()))
+    numbers |= {f"evaluation.pouring.{name}": n for name, n in
+                {"fits": 600, "converged_share": 0.995, "iterations_max": 9, "redrawn": 3}.items()}  # fmt: skip
+    learning = pd.concat([replicates().assign(samples=n, separable_share=0.5) for n in (10, 50)])
+    page = learning_page(learning, ["pouring"], numbers)
+    ceiling = page.legends[0].legend_handles[-1]
+    assert (ceiling.get_label(), ceiling.get_linestyle()) == ("hydrostatic ceiling", ":")
+    assert any("600 fits: 99.5% converged, after 9 iterations" in text for text in texts(page))
+    assert any("3 training sets of one outcome" in text for text in texts(page))
+    assert page.axes[0].get_title() == "Pouring, novel objects (hydrostatics 0.900)"
+
+
+def test_numbers_of_forty_objects_stay_in_their_cells():
+    pairs = areas([f"cup_{number}" for number in range(40)])
+    figure = matrices_page(pairs, ["pouring", "filling"], by.object_numbers(pairs, object_weights(40, 20, 0)))
+    figure.canvas.draw()
+    axis = figure.axes[0]
+    cell = axis.get_window_extent().width / 40
+    numbers = [text for text in axis.texts if text.get_ha() == "center"]
+    assert len(numbers) == 41 * 40
+    assert max(text.get_window_extent().width for text in numbers) < cell
+    beside = [text.get_window_extent() for text in axis.texts if text.get_ha() != "center"]
+    assert all(above.y0 > below.y1 - 1 for above, below in pairwise(beside))
+
+
+@pytest.mark.parametrize("page", ["scores", "matrices", "claims"])
+def test_nothing_leaves_the_paper(page):
+    numbers = by.score_numbers(by.by_name(replicates())) | by.object_numbers(areas(), WEIGHTS)
+    figure = {
+        "scores": lambda: scores_page(numbers, ["pouring", "filling"], {}),
+        "matrices": lambda: matrices_page(areas(), ["pouring", "filling"], numbers),
+        "claims": lambda: claims_page(by.claim_rows(all_values())),
+    }[page]()
+    figure.canvas.draw()
+    every = [*figure.texts, *(text for axis in figure.axes for text in axis.texts)]
+    assert max(text.get_window_extent().x1 for text in every) < 0.985 * figure.bbox.width
+    assert min(text.get_window_extent().y0 for text in every) > 0.005 * figure.bbox.height
+
+
 def all_values() -> dict[str, np.ndarray]:
     values = by.by_name(replicates())
     values |= {f"classify.{name}.same_auc_difference_max": 0.0 for name in ("pouring", "filling")}
@@ -113,16 +193,15 @@ def test_ablations_are_compared_with_the_default_replicate_by_replicate():
 def test_the_pages_are_the_same_bytes_for_the_same_numbers(tmp_path):
     numbers = by.score_numbers(by.by_name(replicates()))
     numbers |= {"evaluation.pouring.label_mapping.novel.calibration_error": 0.1}
-    pairs = pd.DataFrame([{"experiment": "pouring", "features": name, "training_object": a, "test_object": b, "auc": 0.9}
-                          for name in SETS for a in NAMES for b in NAMES])  # fmt: skip
+    numbers |= by.object_numbers(areas(), WEIGHTS)
     learning = pd.concat([replicates().assign(samples=n, separable_share=0.5) for n in (10, 50)])
     curves = {("pouring", "label_mapping"): by.calibration(predictions(), NAMES, WEIGHTS)}
     ablated = {("default", "pouring"): replicates(), ("k_5", "pouring"): replicates(0.01)}
     for name in ("one.pdf", "two.pdf"):
         pages = [
             scores_page(numbers, ["pouring", "filling"], curves),
-            matrices_page(pairs, ["pouring"]),
-            learning_page(learning, ["pouring"], {"pouring": 0.99}),
+            matrices_page(areas(), ["pouring"], numbers),
+            learning_page(learning, ["pouring"], numbers),
             claims_page(by.claim_rows(all_values())),
             draw(ablation_numbers(ablated), {"default": ":None", "k_5": "warp.k:5"}, list(ablated), 300, 5),
         ]

@@ -6,7 +6,7 @@ import pytest
 from PIL import Image
 
 from pipeline.report import execution_numbers as numbers
-from pipeline.report import pairs
+from pipeline.report import pairs, robot_claims
 from pipeline.report.execution import write_gif
 from pipeline.report.execution_page import Film, pictures, rates, safety_table
 
@@ -92,6 +92,39 @@ def test_a_tilt_above_its_reference_outside_the_opening_is_unsafe_on_the_way_in_
     ]
     row = numbers.unsafe(pd.concat(runs), parameters).iloc[0]
     assert (row["way_in"], row["ever"]) == (0.25, 0.5)
+
+
+def robot(novel: int, way_in: float, off_m: float) -> pd.DataFrame:
+    """Return the robot's claims of a demonstrated and two novel pairs: successes of ten pours of one, tilts, where drops fall."""
+    poured = executions({("cup", "bowl"): 0, ("mug", "bowl"): 10, ("jug", "bowl"): novel}).assign(
+        first_drop_s=1.0
+    )
+    paths = [
+        pd.DataFrame(
+            {"t_s": [0.0, 1.0, 2.0], "lip_x_m": [-0.2, -off_m, -0.2], "lip_y_m": 0.0, "draw": draw}
+        ).assign(held_object=held, target_object="bowl", features="label_mapping")
+        for held in ("cup", "mug", "jug")
+        for draw in range(10)
+    ]
+    parameters = pd.DataFrame({"object": ["bowl"], "mapping": "label_mapping", "radius_m": [0.05]})
+    safety = poured[["held_object", "target_object", "features"]].drop_duplicates().assign(way_in=way_in)
+    return robot_claims.claim_rows(poured, pd.concat(paths), safety, parameters, ("cup", "bowl")).set_index(
+        "name"
+    )
+
+
+def test_the_papers_claims_about_the_robot_are_told_of_the_pairs_they_are_about():
+    rows = robot(novel=10, way_in=0.001, off_m=0.04)
+    assert list(rows["holds"]) == [True] * len(robot_claims.CLAIMS)
+    assert rows["sure"].all()
+    assert (
+        rows.loc["robot_pours_novel_objects", "value"] == 1.0
+    )  # the demonstrated pair fails, and is not asked
+    worse = robot(novel=6, way_in=0.1, off_m=0.01)
+    assert list(worse["holds"]) == [False] * len(robot_claims.CLAIMS)
+    assert worse.loc["robot_spills_a_couple", "value"] == pytest.approx(21 * 0.4 / 2)
+    assert not worse.loc["robot_pours_novel_objects", "sure"]
+    assert worse.loc["robot_pours_near_the_rim", "value"] == 0.0
 
 
 def test_every_pair_that_fails_is_listed_with_the_causes_of_each_set():

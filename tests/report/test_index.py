@@ -76,7 +76,8 @@ def folder(tmp_path_factory):
     for column in TABLES["parameters"].names[2:]:
         parameters[column] = np.where(parameters["mapping"] == "label_mapping", 0.04, 0.5)
     write_table(folder / "parametrise/mug/parameters.parquet", parameters, "parameters")
-    write_json(folder / "metrics.json", {**NUMBERS, "claims": CLAIMS})
+    write_json(folder / "metrics.json", {**NUMBERS, "claims": CLAIMS[:1]})
+    write_json(folder / "execution.json", {"claims": CLAIMS[1:]})
     figure, axis = plt.subplots(figsize=(7, 2))
     axis.plot([0, 1], [0, 1])
     save([figure, figure], folder / "roc.pdf")
@@ -97,7 +98,6 @@ def page(folder):
     }
     files = {
         "processed": folder,
-        "numbers": folder / "metrics.json",
         "figures": folder / "roc.pdf",
         "scans": folder / "mug.png",
     }
@@ -110,6 +110,7 @@ def page(folder):
         "--output",
         folder / "index.html",
     ]
+    command += ["--numbers", folder / "metrics.json", folder / "execution.json"]
     command += [f"--{key}={value}" for key, value in {**options, **files}.items()]
     subprocess.run(list(map(str, command)), check=True)
     return (folder / "index.html").as_uri()
@@ -224,6 +225,12 @@ def test_the_liquid_on_the_page_is_that_of_hydrostatics(browser, page):
             held, keeps = (int(re.search(rf"{what} (\d+) ml", words)[1]) for what in ("capacity of", "keeps"))
             kept.append(keeps / held)
     np.testing.assert_allclose(kept, true, atol=0.025)
+
+
+def test_claims_of_all_numbers_are_on_the_page(browser, page):
+    with opened(browser, page) as tab:
+        assert tab.page.locator(".narrow .yes").count() == 1
+        assert tab.page.locator(".narrow .no").count() == 1
 
 
 def test_numbers_are_said_with_their_intervals_and_claims_with_their_answers():

@@ -71,6 +71,20 @@ def _curves() -> pd.DataFrame:
     return curves.assign(tpr=curves["fpr"] ** (0.5 / (1 + curves["draw"])))
 
 
+def _learning() -> pd.DataFrame:
+    """Return areas of 0.7, 0.8, 0.9 with 10, 50, 500 trials; a resampled replicate has others."""
+    scores = dict.fromkeys(("partial_auc", "tpr_at_fpr_00", "tpr_at_fpr_01", "tpr_at_fpr_05", "brier"), 0.1)
+    return pd.DataFrame(
+        {
+            **{"experiment": "pouring", "features": "standard", "split": "novel", "samples": samples},
+            **{"replicate": replicate, "auc": auc - 0.1 * replicate, **scores},
+            **{"separable_share": 0.5, "converged_share": 1.0, "n_redrawn": 0},
+        }
+        for samples, auc in ((500, 0.9), (10, 0.7), (50, 0.8))
+        for replicate in range(2)
+    )
+
+
 def leave(folder: Path) -> Path:
     """Fill `folder` with raw data, classifiers, figures, benchmarks and logs; return it."""
     for name in OBJECTS:
@@ -82,6 +96,7 @@ def leave(folder: Path) -> Path:
     made = folder / "processed/classify/pouring"
     write_table(made / "scores.parquet", _scores(), "scores")
     write_table(made / "curves.parquet", _curves(), "curves")
+    write_table(made / "learning.parquet", _learning(), "learning")
     everyone = [fitted(name, set_, draw)[0] for name in OBJECTS for set_ in FEATURES for draw in range(2)]
     write_models(made / "models.json", everyone)
     (folder / "reports/scans").mkdir(parents=True)
@@ -108,8 +123,12 @@ def track(folder: Path, *arguments: str, **environment: str) -> subprocess.Popen
 
 
 def end(folder: Path, status: str, since_s: float, **environment: str) -> tuple[int, str, str]:
-    """Record the end of a call as the workflow does; return exit code, stdout, and stderr without its progress."""
-    job = start_end(folder, status, since_s, **environment)
+    """Record the end of a call as the workflow does; return what `told` does."""
+    return told(start_end(folder, status, since_s, **environment))
+
+
+def told(job: subprocess.Popen) -> tuple[int, str, str]:
+    """Wait for a process; return exit code, stdout, and stderr without the progress that a busy machine is told of."""
     out, err = job.communicate()
     lines = [line for line in err.splitlines(keepends=True) if not line.startswith("track: runs")]
     return job.returncode, out, "".join(lines)

@@ -1,11 +1,13 @@
 """What is recorded is read off files correctly."""
 
 import os
+import time
 
 import numpy as np
 import pytest
 from track.calls import leave
 
+from pipeline.command import progress, steps
 from pipeline.track import facts
 from pipeline.track.failures import failures
 from pipeline.track.stages import jobs, stage_runs
@@ -66,6 +68,17 @@ Exiting because a job execution failed. Look above for error messages
 """
 
 
+def _count() -> None:
+    for _ in progress(range(3), 3, "trials", every_s=0.0):
+        time.sleep(0.001)
+
+
+def _step() -> None:
+    with steps("trials", 2, every_s=0.01) as tell:
+        tell("one")
+        time.sleep(0.05)
+
+
 def test_failures_name_rule_stage_log_and_reason(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "logs/fuse").mkdir(parents=True)
@@ -76,6 +89,18 @@ def test_failures_name_rule_stage_log_and_reason(tmp_path, monkeypatch):
     assert failure.reason == "error: data/raw/mug: expected x, found y"
     (run,) = stage_runs([], [failure], {}, now_s=300.0)
     assert (run.name, run.status, run.tags["failed.log"]) == ("stage fuse", "FAILED", "logs/fuse/mug.log")
+
+
+@pytest.mark.parametrize("tell", [_count, _step])
+def test_a_job_that_was_killed_has_not_failed_of_its_progress(tmp_path, monkeypatch, capfd, tell):
+    monkeypatch.chdir(tmp_path)
+    tell()
+    said = capfd.readouterr().err
+    assert said.startswith("trials")
+    (tmp_path / "job.log").write_text(said)
+    (tmp_path / "one.log").write_text(SNAKEMAKE.format(log="job.log"))
+    (failure,) = failures(["one.log"])
+    assert failure.reason == f"ended without an error, as when it is killed, after: {said.splitlines()[-1]}"
 
 
 def test_a_classifier_run_has_means_curves_and_the_ceiling(tmp_path):

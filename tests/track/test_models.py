@@ -14,10 +14,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from sklearn.base import clone
 from track.calls import fitted
 
 from pipeline.models import expanded
-from pipeline.track.estimators import ensemble, example, pipeline_of
+from pipeline.track.estimators import ensemble, example, pipeline_of, probabilities
 from pipeline.track.store import client
 
 
@@ -41,6 +42,16 @@ def test_the_ensemble_is_the_mean_over_draws():
     rows = example(models)
     mean = np.mean([model.probability(rows.to_numpy()) for model in models], axis=0)
     assert np.allclose(ensemble(models).predict_proba(rows)[:, 1], mean, atol=1e-12)
+    assert np.allclose(ensemble(models).predict_proba(rows), probabilities(models, rows), atol=1e-12)
+
+
+def test_the_ensemble_holds_each_fitted_classifier_once():
+    voting = ensemble([fitted("mug", "standard", draw)[0] for draw in range(3)])
+    templates = [one for _, one in voting.estimators]
+    assert [hasattr(one[-1], "coef_") for one in (*templates, *voting.estimators_)] == [False] * 3 + [
+        True
+    ] * 3
+    assert all(clone(one)[-1].C == one[-1].C == 1.0 for one in templates)
 
 
 def _run_id(folder, name: str) -> str:

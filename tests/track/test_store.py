@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 import pytest
-from track.calls import OBJECTS, end, leave, track
+from track.calls import OBJECTS, end, leave, told, track
 
 from pipeline.track.store import client
 
@@ -94,15 +94,13 @@ def test_the_data_of_a_run_can_be_read_from_its_source(tracked):
 def test_a_lost_store_is_told_again_with_the_same_runs(again):
     before = _said(again)
     (again / "mlflow.db").unlink()
-    job = track(again, "again")
-    assert job.communicate() == ("1 calls recorded, 0 were there already\n", "")
+    assert told(track(again, "again")) == (0, "1 calls recorded, 0 were there already\n", "")
     assert _said(again) == before
 
 
 def test_a_call_that_is_there_is_not_told_twice(again):
     before = _said(again)
-    job = track(again, "again")
-    assert job.communicate() == ("0 calls recorded, 1 were there already\n", "")
+    assert told(track(again, "again")) == (0, "0 calls recorded, 1 were there already\n", "")
     assert _said(again) == before
 
 
@@ -154,10 +152,27 @@ def test_a_failed_call_has_the_rule_its_log_and_no_result_of_an_earlier_one(tmp_
     assert parent.data.tags["failed.rule"] == "fuse"
     assert "found y" in parent.data.tags["mlflow.note.content"]
     assert "simulate.pouring.leaked" not in parent.data.metrics
+    assert "classify.pouring.standard.novel.auc_by_samples" not in parent.data.metrics
     assert [run.info.status for run in _runs(folder, "stage")[1]] == ["FAILED"]
     assert _runs(folder, "classifier")[1] == []
     logs = store.list_artifacts(parent.info.run_id, "failed/logs/fuse")
     assert [item.path for item in logs] == ["failed/logs/fuse/mug.log"]
+
+
+def test_learning_curves_are_curves_of_the_call(tracked):
+    store, (parent,) = _runs(tracked, "call")
+    curve = store.get_metric_history(parent.info.run_id, "classify.pouring.standard.novel.auc_by_samples")
+    assert [(point.step, point.value) for point in curve] == [(10, 0.7), (50, 0.8), (500, 0.9)]
+
+
+def test_a_call_that_its_user_stopped_says_so(tmp_path):
+    folder = leave(tmp_path)
+    (folder / "call.log").write_text(
+        f"Terminating processes on user request, this might take some time.\n{FAILED}"
+    )
+    assert end(folder, "failed", time.time() + 60) == (0, "", "")
+    note = _runs(folder, "call")[1][0].data.tags["mlflow.note.content"]
+    assert note.startswith("Stopped by its user, while there ran:\n- `fuse`: ended without a word")
 
 
 @pytest.mark.parametrize("uri", ["nonsense://nowhere", "http://127.0.0.1:9"])

@@ -87,6 +87,8 @@ def test_a_card_is_for_the_liquid_alone():
 def test_nearest_proposes_only_what_is_near():
     assert nearest("voxl_m", ["voxel_m", "points"]) == " (did you mean 'voxel_m'?)"
     assert nearest("abc", ["voxel_m", "points"]) == ""
+    assert nearest("MUG", ["jug", "mug", "my_mug"]) == " (did you mean 'mug'?)"
+    assert nearest("My-Mug", ["jug", "mug", "my_mug"]) == " (did you mean 'my_mug'?)"
 
 
 @pytest.mark.parametrize(

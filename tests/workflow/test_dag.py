@@ -1,5 +1,6 @@
 """The whole workflow on the small overlay: it runs, it is reproducible, and a change reruns what depends on it and no more."""
 
+import base64
 import os
 
 import pytest
@@ -194,6 +195,19 @@ def test_an_object_is_dropped_and_taken_away_again(project):
     assert project.call().returncode == 0
     after = project.contents()
     assert [path for path in before if before[path] != after.get(path)] == []
+
+
+def test_a_call_that_was_stopped_while_it_compiled_is_taken_up_to_its_end(project):
+    (project / "reports/roc.pdf").unlink()
+    name = base64.b64encode(b"data/processed/compile/simulate.json").decode()
+    (project / ".snakemake/incomplete").mkdir(exist_ok=True)
+    (project / f".snakemake/incomplete/{name}").touch()  # as Snakemake's that was killed leaves it
+    assert {"compile simulate", "report"} <= project.planned("reports/roc.pdf")
+
+
+def test_functions_that_were_compiled_again_rerun_nothing(project):
+    (project / "data/processed/compile/fuse.json").touch()
+    assert project.planned() == set()
 
 
 def test_a_broken_object_costs_itself_alone(project):

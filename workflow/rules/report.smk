@@ -397,6 +397,7 @@ INDEX_FIGURES = [
 INDEX_NUMBERS = [
     rules.report.output.metrics,
     rules.report_evaluation.output.numbers,
+    *([rules.report_execution.output.numbers] if HAS_DEMONSTRATIONS else []),
 ]
 
 

@@ -47,6 +47,7 @@ def call(options: argparse.Namespace) -> dict[str, Any]:
         {"/save": annotation.save},
         port=options.port,
         opened=not options.no_browser,
+        closes=True,
     )
     return {
         "object": name,

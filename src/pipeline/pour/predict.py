@@ -23,13 +23,12 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--tilt", required=True, help="how far it is tilted about its lip: 45 (degrees), 0.8rad"
     )
     parser.add_argument("--into", metavar="OBJECT", help="the container that is to be filled")
-    parser.add_argument("--into-fill", default="0%", help="liquid in that container")
+    parser.add_argument("--into-fill", metavar="FILL", help="liquid in that container; 0%% when not given")
     parser.add_argument(
-        "--along",
-        help="lip from the centre of its opening, along the pour; when not given, one radius of the opening",
+        "--along", help="lip from the centre of its opening, along the pour; one radius of it when not given"
     )
-    parser.add_argument("--across", default="0mm", help="and across the pour")
-    parser.add_argument("--height", default="50mm", help="lip above the centre of its opening")
+    parser.add_argument("--across", help="and across the pour; 0mm when not given")
+    parser.add_argument("--height", help="lip above the centre of its opening; 50mm when not given")
     parser.add_argument("--mapping", choices=MAPPINGS, default=MAPPINGS[0], help="whose parameters are used")
     parser.add_argument(
         "--learnt-from", metavar="OBJECT", help="the object of the trials; without it the source"
@@ -44,8 +43,20 @@ def call(options: argparse.Namespace) -> dict:
     project.made(f"parametrise/{source}/parameters.parquet")
     predictor = Predictor(project.processed, source, mapping=options.mapping, training_object=learnt)
     second = project.check(options.into) if options.into else None
+    if second is None:
+        _check_alone(options)
     found = _asked(predictor, name, second, options)
     return {"object": name, "into": second, **asdict(found)}
+
+
+def _check_alone(options: argparse.Namespace) -> None:
+    """Refuse what is said of a second container when there is none: it would change nothing."""
+    of_second = ("into_fill", "along", "across", "height")
+    for name in of_second:
+        if (value := getattr(options, name)) is not None:
+            raise PipelineError(
+                f"--{name.replace('_', '-')} {value}: expected a second container, found none; name it with --into"
+            )
 
 
 def _asked(predictor: Predictor, name: str, second: str | None, options: argparse.Namespace) -> Prediction:
@@ -64,13 +75,13 @@ def _asked(predictor: Predictor, name: str, second: str | None, options: argpars
         second,
         **pour,
         second_fill_m3=volume_m3(
-            options.into_fill, "--into-fill", predictor.parameters(second)["capacity_m3"]
+            options.into_fill or "0%", "--into-fill", predictor.parameters(second)["capacity_m3"]
         ),
         along_m=length_m(options.along, "--along")
         if options.along
         else predictor.parameters(second)["radius_m"],
-        across_m=length_m(options.across, "--across"),
-        height_m=length_m(options.height, "--height"),
+        across_m=length_m(options.across or "0mm", "--across"),
+        height_m=length_m(options.height or "50mm", "--height"),
     )
 
 

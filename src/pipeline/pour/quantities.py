@@ -32,7 +32,7 @@ def angle_rad(text: str, option: str) -> float:
     value = _value(text, option, ANGLES_RAD, "45 (degrees) or 0.8rad")
     if not 0 <= value <= math.pi:
         raise PipelineError(
-            f"{option} {text}: expected a tilt from 0 to 180 degrees, found another; correct it"
+            f"{option} {text}: expected a tilt from 0 to 180 degrees, found {math.degrees(value):g}; correct it"
         )
     return value
 

@@ -1,4 +1,4 @@
-"""Serve one page to the browser of this machine until it is closed."""
+"""Serve one page to the browser of this machine until it is closed or Ctrl-C."""
 
 import secrets
 import threading
@@ -13,8 +13,15 @@ HOST = "127.0.0.1"
 Answer = Callable[[Any], Any]
 
 
-def serve(page: Callable[[str], str], answers: Mapping[str, Answer], *, port: int, opened: bool) -> None:
-    """Serve `page(token)` on this machine alone until Ctrl-C or until the page posts to /close.
+def serve(
+    page: Callable[[str], str],
+    answers: Mapping[str, Answer],
+    *,
+    port: int,
+    opened: bool,
+    closes: bool = False,
+) -> None:
+    """Serve `page(token)` on this machine alone until Ctrl-C or, where it `closes`, until the page posts to /close.
 
     `answers`: path → what answers JSON posted there, in the server's thread; a `PipelineError` is told to the page. Only the
     page itself can post, as it alone knows the token. `opened`: open it in the user's browser, too.
@@ -25,7 +32,8 @@ def serve(page: Callable[[str], str], answers: Mapping[str, Answer], *, port: in
 
     logging.getLogger("werkzeug").setLevel(logging.ERROR)
     closing = threading.Event()
-    application = _application(page, {**answers, "/close": lambda _: closing.set()})
+    close = {"/close": lambda _: closing.set()} if closes else {}
+    application = _application(page, {**answers, **close})
     try:
         server = make_server(HOST, port, application, threaded=True)
     except (OSError, SystemExit) as error:
@@ -35,7 +43,7 @@ def serve(page: Callable[[str], str], answers: Mapping[str, Answer], *, port: in
     url = f"http://{HOST}:{server.server_port}/"
     thread = threading.Thread(target=server.serve_forever, daemon=True)
     thread.start()
-    say(f"{url} is open until it is closed there or by Ctrl-C here")
+    say(f"{url} is open until {'it is closed there or by ' if closes else ''}Ctrl-C here")
     if opened:
         webbrowser.open(url)
     try:

@@ -23,7 +23,7 @@ def page_options(parser: argparse.ArgumentParser) -> None:
 
 
 def call(options: argparse.Namespace) -> dict[str, Any]:
-    """Serve the page until it is closed; return what was shown."""
+    """Serve the page until Ctrl-C; return what was shown."""
     project = Project(options.project)
     names = [project.check(name) for name in options.object]
     for name in names:

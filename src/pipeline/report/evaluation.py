@@ -47,14 +47,12 @@ def main() -> None:
         values[same] = score_metrics(experiment, scores)[same]
     numbers |= learning_numbers(learning)
     claims = by.claim_rows(values)
+    numbers |= by.object_numbers(pairs, _weights(options, pairs["training_object"].nunique()))
     experiments = list(dict.fromkeys(replicates["experiment"]))
-    ceilings = {
-        e: numbers[k] for e in experiments if (k := f"evaluation.{e}.hydrostatic.novel.auc") in numbers
-    }
     figures = [
         pages.scores_page(numbers, experiments, calibrations),
-        pages.matrices_page(pairs, experiments),
-        learning_page(learning, experiments, ceilings),
+        pages.matrices_page(pairs, experiments, numbers),
+        learning_page(learning, experiments, numbers),
         claims_page(claims),
     ]
     save(figures, options.page)
@@ -80,9 +78,8 @@ def _of_predictions(
     import pandas as pd
 
     from pipeline.report import evaluation_numbers as by
-    from pipeline.statistics.resampling import object_weights
 
-    weights = object_weights(len(names), options.resamples, options.seed)
+    weights = _weights(options, len(names))
     predictions = read_table(path, "predictions")
     novel = predictions[predictions["split"] == "novel"]
     found: dict[str, Any] = {
@@ -105,6 +102,13 @@ def _of_predictions(
         for name, values in found["values"].items():
             found["numbers"] |= by.with_interval(name.replace("classify.", "evaluation."), values)
     return found
+
+
+def _weights(options: argparse.Namespace, n_objects: int) -> np.ndarray:
+    """Return the replicates that `classify` drew."""
+    from pipeline.statistics.resampling import object_weights
+
+    return object_weights(n_objects, options.resamples, options.seed)
 
 
 def learning_numbers(learning: "pd.DataFrame") -> dict[str, float]:

@@ -50,6 +50,30 @@ def score_numbers(values: Mapping[str, np.ndarray]) -> Numbers:
     return numbers
 
 
+def object_numbers(pairs: pd.DataFrame, weights: np.ndarray) -> Numbers:
+    """Return each object's mean area over the others, as trainer and as test, with intervals; weights are (1 + R, objects).
+
+    Of one pair of objects nothing can be drawn again: a row or a column of the matrix is resampled by its other objects.
+    """
+    numbers: Numbers = {}
+    names = list(dict.fromkeys(pairs["training_object"]))
+    for (experiment, features), rows in pairs.groupby(["experiment", "features"], observed=True):
+        areas = rows.pivot_table(
+            index="training_object", columns="test_object", values="auc", aggfunc="mean", observed=True
+        )
+        matrix = areas.reindex(index=names, columns=names).to_numpy(float, copy=True)
+        np.fill_diagonal(matrix, np.nan)
+        for role, lines in (("trained_on", matrix), ("tested_on", matrix.T)):
+            for name, line in zip(names, lines, strict=True):
+                told = np.isfinite(line)
+                total = weights[:, told].sum(axis=1)
+                if told.any():
+                    with np.errstate(invalid="ignore"):  # a replicate without any of the others is left out
+                        values = weights[:, told] @ line[told] / total
+                    numbers |= with_interval(f"evaluation.{experiment}.{features}.{role}.{name}.auc", values)
+    return numbers
+
+
 def fit_numbers(experiment: str, scores: pd.DataFrame) -> Numbers:
     """Return how the fits went: separable sets, converged fits, most iterations, redrawn sets of one class."""
     trained = scores[(scores["features"] != "hydrostatic") & (scores["split"] == "same")]

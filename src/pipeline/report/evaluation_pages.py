@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 A4 = (8.27, 11.69)
+LEGIBLE = 12  # objects of which a matrix' cells hold their numbers on A4
 SMALL: Any = {
     **RC,
     "font.size": 7,
@@ -37,12 +38,14 @@ LINES: Any = {
 }
 NOTE = (
     "Bars: 95 % percentile intervals of a bootstrap over objects, jointly as trainers and as tests. Filled: novel objects; "
-    "open: other trials of the training object.\nΔ: label mapping − standard features on novel objects, paired replicate by "
-    "replicate. Hydrostatics: the ceiling, nothing is learnt."
+    "open: other trials of the training object.\nΔ, in the colour of its set: a warped one − standard features on novel objects, "
+    "paired replicate by replicate. Hydrostatics: the ceiling, nothing is learnt."
 )
 MATRIX_NOTE = (
     "Means over training sets. Diagonal: other trials of the training object. Last row: hydrostatics. Each object is tested alone, "
-    "without a threshold\nin common with other objects, so these areas exceed those of all novel objects' trials together."
+    "without a threshold\nin common with other objects, so these areas exceed those of all novel objects' trials together.\n"
+    "Right of a row: the mean over the other objects as tests; below a column: over the others as trainers; with its 95 % "
+    "interval by the bootstrap over those."
 )
 
 
@@ -84,16 +87,16 @@ def _delong_note(numbers: Mapping[str, float], experiments: list[str]) -> str:
     )
 
 
-def legend(figure: "Figure", sets: tuple[str, ...] = SETS) -> None:
-    """Write one row below the title that tells colours and markers of feature sets."""
+def legend(figure: "Figure", sets: tuple[str, ...] = SETS, dotted: tuple[str, ...] = ()) -> None:
+    """Write one row below the title that tells colours and markers of feature sets; `dotted` ones are lines."""
     from matplotlib.lines import Line2D
 
     handles = [
         Line2D([], [], marker=MARKERS[name], color=COLOURS[name], ms=4, lw=1, label=WORDS[name])
         for name in sets
-    ]
+    ] + [Line2D([], [], color=COLOURS[name], lw=1, ls=":", label=WORDS[name]) for name in dotted]
     figure.legend(
-        handles=handles, frameon=False, loc="upper center", ncol=len(sets), bbox_to_anchor=(0.5, 0.967)
+        handles=handles, frameon=False, loc="upper center", ncol=len(handles), bbox_to_anchor=(0.5, 0.967)
     )
 
 
@@ -105,7 +108,9 @@ def _forest(axis: "Axes", numbers: Mapping[str, float], experiment: str, *, labe
                 if name in numbers:
                     y = row + 0.18 * (place - 1.5) + (0.0 if split == "novel" else -0.07)
                     bar(axis, numbers, name, y, COLOURS[features], MARKERS[features], filled=split == "novel")
-        axis.text(1.02, row, _difference(numbers, experiment, measure), fontsize=5.5, va="center", ha="left")
+        for features, va in (("label_mapping", "bottom"), ("point_mapping", "top")):
+            text = _difference(numbers, experiment, features, measure)
+            axis.text(1.04, row, text, fontsize=5.5, va=va, color=COLOURS[features])
     axis.set(xlim=(-0.02, 1.02), ylim=(len(MEASURES) - 0.5, -0.5), title=experiment.capitalize())
     axis.set_yticks(range(len(MEASURES)), list(MEASURES.values()) if labelled else [])
     axis.grid(axis="x", lw=0.3, color="#DDDDDD")
@@ -122,12 +127,12 @@ def bar(
     axis.plot(numbers[name], y, marker, ms=3.2, mew=0.7, color=colour, mfc=colour if filled else "white")
 
 
-def _difference(numbers: Mapping[str, float], experiment: str, measure: str) -> str:
-    head = f"evaluation.{experiment}.label_mapping_minus_standard.novel.{measure}"
+def _difference(numbers: Mapping[str, float], experiment: str, features: str, measure: str) -> str:
+    head = f"evaluation.{experiment}.{features}_minus_standard.novel.{measure}"
     if f"{head}.low" not in numbers:
         return ""
-    p = numbers[f"{head}.p"]
-    return f"Δ {numbers[head]:+.3f}\n[{numbers[f'{head}.low']:+.3f},\n {numbers[f'{head}.high']:+.3f}]\np = {p:.3f}"
+    low, high, p = (numbers[f"{head}.{end}"] for end in ("low", "high", "p"))
+    return f"Δ {numbers[head]:+.3f}\n[{low:+.3f}, {high:+.3f}]\np = {p:.3f}\n".replace("-", "−")
 
 
 def _reliability(
@@ -157,21 +162,32 @@ def _reliability(
         axis.legend(frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.17))
 
 
-def matrices_page(pairs: "pd.DataFrame", experiments: list[str]) -> "Figure":
-    """Return the page of areas, training object by test object, of each feature set; hydrostatics as a last row."""
+def matrices_page(pairs: "pd.DataFrame", experiments: list[str], numbers: Mapping[str, float]) -> "Figure":
+    """Return the page of areas, training object by test object, of each feature set; hydrostatics as a last row.
+
+    `numbers` has each object's mean over the others, as trainer and as test (`evaluation_numbers.object_numbers`).
+    """
     import matplotlib.pyplot as plt
 
     names = list(dict.fromkeys(pairs["training_object"]))
     with plt.rc_context(SMALL):
-        figure, axes = plt.subplots(3, len(experiments), figsize=A4, squeeze=False)
-        figure.subplots_adjust(left=0.13, right=0.99, top=0.93, bottom=0.09, hspace=0.55, wspace=0.3)
+        # Cells and letters keep their size: with many objects it is the paper that grows.
+        grown = max(1.0, len(names) / LEGIBLE)
+        size = A4[0] * grown, A4[1] * grown
+        figure, axes = plt.subplots(3, len(experiments), figsize=size, squeeze=False)
+        left, right, top, bottom = (edge / grown for edge in (0.12, 0.09, 0.07, 0.13))
+        figure.subplots_adjust(left=left, right=1 - right, top=1 - top, bottom=bottom)
+        figure.subplots_adjust(hspace=0.58 / grown, wspace=0.6 / grown)
         for column, experiment in enumerate(experiments):
             of_experiment = pairs[pairs["experiment"] == experiment]
             for row, features in enumerate(SETS[:3]):
-                _matrix(axes[row, column], of_experiment, features, names)
-                axes[row, column].set_title(f"{experiment.capitalize()}, {WORDS[features]}")
-        figure.suptitle("Area under the curve, training object by test object", y=0.975, fontsize=10)
-        figure.text(0.06, 0.008, MATRIX_NOTE, fontsize=6.5)
+                axis = axes[row, column]
+                _matrix(axis, of_experiment, features, names)
+                _means(axis, f"evaluation.{experiment}.{features}", names, numbers)
+                axis.set_title(f"{experiment.capitalize()}, {WORDS[features]}")
+        title = "Area under the curve, training object by test object"
+        figure.suptitle(title, y=1 - 0.025 / grown, fontsize=10)
+        figure.text(0.06 / grown, 0.012 / grown, MATRIX_NOTE, fontsize=6.5)
     return figure
 
 
@@ -197,7 +213,31 @@ def _matrix(axis: "Axes", pairs: "pd.DataFrame", features: str, names: list[str]
                 color="white" if value < 0.88 else "black",
             )
     words = [name.replace("_", " ") for name in names]
-    axis.set_xticks(range(len(names)), words, rotation=90, fontsize=5.5)
     axis.set_yticks(range(len(names) + 1), [*words, "hydrostatics"], fontsize=5.5)
     axis.axhline(len(names) - 0.5, color="white", lw=1.5)
     axis.set(xlabel="tested on", ylabel="trained on")
+
+
+def _means(axis: "Axes", head: str, names: list[str], numbers: Mapping[str, float]) -> None:
+    """Write each object's mean over the others beside its row and below its column."""
+    for place, name in enumerate(names):
+        axis.text(
+            len(names) - 0.35, place, _told(numbers, f"{head}.trained_on.{name}.auc"), fontsize=5, va="center"
+        )
+    told = [_told(numbers, f"{head}.tested_on.{name}.auc") for name in names]
+    words = [name.replace("_", " ") for name in names]
+    axis.set_xticks(
+        range(len(names)),
+        [f"{word}\n{text}" for word, text in zip(words, told, strict=True)],
+        rotation=90,
+        fontsize=5.5,
+    )
+
+
+def _told(numbers: Mapping[str, float], name: str) -> str:
+    if f"{name}.low" not in numbers:
+        return ""
+    value, low, high = (
+        f"{numbers[key]:.2f}".removeprefix("0") for key in (name, f"{name}.low", f"{name}.high")
+    )
+    return f"{value} [{low}, {high}]"

@@ -35,22 +35,26 @@ def main() -> None:
     options = parser.parse_args()
 
     from pipeline.motion.demonstrations import read_pair
-    from pipeline.report import execution_numbers, execution_page
+    from pipeline.report import execution_numbers, execution_page, robot_claims
+    from pipeline.report.claims_page import claims_page
     from pipeline.report.style import save
 
     shown = read_pair(options.demonstration)
     demonstrated = shown["held_object"], shown["target_object"]
     executions = read_table(options.executions, "executions")
     trajectories = read_table(options.trajectories, "trajectories")
-    executed = execution_numbers.unsafe(trajectories, read_table(options.parameters, "parameters"))
-    safety = execution_numbers.with_drawn(executed, read_table(options.safety, "safety"))
+    parameters, drawn = read_table(options.parameters, "parameters"), read_table(options.safety, "safety")
+    safety = execution_numbers.with_drawn(execution_numbers.unsafe(trajectories, parameters), drawn)
+    claims = robot_claims.claim_rows(executions, trajectories, drawn, parameters, demonstrated)
     films = [film(pair, path, executions, demonstrated) for pair, path in options.films]
     with command.steps("what the robot poured", 4) as tell:
         tell("pages")
         pages = [execution_page.pictures(films), execution_page.rates(executions, safety)]
-        save([*pages, execution_page.safety_table(safety)], options.pages)
+        pages += [execution_page.safety_table(safety), claims_page(claims, robot_claims.NOTE)]
+        save(pages, options.pages)
         write_gif(options.film, films, tell)
-    write_json(options.numbers, execution_numbers.numbers(executions, safety, demonstrated))
+    found = execution_numbers.numbers(executions, safety, demonstrated)
+    write_json(options.numbers, found | {"claims": claims.to_dict("records")})
 
 
 def film(pair: str, path: Path, executions: "pd.DataFrame", demonstrated: tuple[str, str]) -> "Film":

@@ -9,10 +9,10 @@ from typing import Any
 
 from pipeline.track import facts
 from pipeline.track.executed import executed_runs
-from pipeline.track.failures import Failure, failures, text
+from pipeline.track.failures import Failure, failures, stopped, text
 from pipeline.track.runs import Data, File, Run
 from pipeline.track.stages import failure_tags, jobs, spent, stage_runs
-from pipeline.track.trained import trained_runs
+from pipeline.track.trained import learning_curves, trained_runs
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,8 @@ def call_run(call: Call) -> Run:
         found = {key: value for key, value, _ in stage.metrics}
         numbers |= {f"{what}.{stage.tags['stage']}": found[what] for what in ("seconds", "cpu_seconds")}
     run.metrics = [(key, value, 0) for key, value in numbers.items()]
+    for path in sorted(Path(call.processed).glob("classify/*/learning.parquet")):
+        run.metrics += learning_curves(path) if facts.made(path, call.since_s) else []
     run.nested += _classifiers(call, flat) + _executions(call, flat)
     for nested in run.nested:
         nested.tags |= origin
@@ -101,4 +103,5 @@ def _note(call: Call, failed: list[Failure]) -> str:
     if call.status == "success":
         return objects
     lines = [f"- `{failure.rule}`: {failure.reason} ({', '.join(failure.logs)})" for failure in failed]
-    return "\n".join(["Failed:", *(lines or ["- no job failed: the call was stopped"]), "", objects])
+    head = "Stopped by its user, while there ran:" if stopped(call.logs) else "Failed:"
+    return "\n".join([head, *(lines or ["- no job failed: the call was stopped"]), "", objects])

@@ -8,6 +8,9 @@ from pathlib import Path
 # "Error in rule fuse:", then indented lines, of which "log: a.log, b.log (check log file(s) for error details)" is one.
 _FAILED = re.compile(r"^Error in rule (?P<rule>\w+):\n(?P<body>(?:    .*\n)*)", re.MULTILINE)
 _LOGS = re.compile(r"^    log: (?P<logs>.*?)(?: \(check log file.*)?$", re.MULTILINE)
+# A line of `command.progress` or `command.steps`: no reason why a job ended.
+_PROGRESS = re.compile(r".*\((?:[\d.]+/s, \d+ s left|step \d+ of \d+, \d+ s so far)\)")
+_STOPPED = "Terminating processes on user request"
 LONGEST_CHARACTERS = 65536
 
 
@@ -37,6 +40,11 @@ def failures(snakemake_logs: Iterable[str | Path]) -> list[Failure]:
     return list(found.values())
 
 
+def stopped(snakemake_logs: Iterable[str | Path]) -> bool:
+    """Return whether a call ended because its user wanted it to (Ctrl-C): then it is no news that jobs failed."""
+    return any(_STOPPED in text(path) for path in snakemake_logs)
+
+
 def text(path: str | Path) -> str:
     """Return the end of a log; nothing, when there is none."""
     try:
@@ -48,4 +56,9 @@ def text(path: str | Path) -> str:
 def _reason(logs: tuple[str, ...]) -> str:
     lines = [line.strip() for path in logs for line in text(path).splitlines() if line.strip()]
     said = [line for line in lines if line.startswith("error: ")]
-    return (said or lines or ["no log"])[-1]
+    reason = (said or lines or [""])[-1]
+    if not reason:
+        return "ended without a word, as when it is killed"
+    if _PROGRESS.fullmatch(reason):
+        return f"ended without an error, as when it is killed, after: {reason}"
+    return reason

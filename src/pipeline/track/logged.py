@@ -2,36 +2,22 @@
 
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor
-from contextlib import contextmanager
+import zipfile
 from functools import cache
 from importlib.metadata import version
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 from pipeline.models import chosen, read_models
-from pipeline.track.estimators import ensemble, example, packed
+from pipeline.track.estimators import ensemble, example, probabilities
 from pipeline.track.runs import Classifiers, File
 
 NAME = "classifier"
 REQUIRED = ("mlflow", "scikit-learn", "skops", "numpy", "pandas")
 
-Packages = dict[Classifiers, Future[bytes]]
 
-
-@contextmanager
-def packing(wanted: Iterable[Classifiers]) -> Iterator[Packages]:
-    """Have classifiers packed in a process beside this one, which waits for the store meanwhile."""
-    with ProcessPoolExecutor(1, get_context("spawn")) as beside:
-        yield {classifiers: beside.submit(_packed, classifiers) for classifiers in wanted}
-
-
-def log_classifiers(
-    client: Any, experiment_id: str, run_id: str, classifiers: Classifiers, package: Future[bytes]
-) -> None:
-    """Log the classifiers of a run as the model `runs:/<run>/classifier`; `package` is what `packing` makes of them.
+def log_classifiers(client: Any, experiment_id: str, run_id: str, classifiers: Classifiers) -> None:
+    """Log the classifiers of a run as the model `runs:/<run>/classifier`.
 
     The steps are those of `mlflow.sklearn.log_model`, which wants an active run and packs without compression (1.4 MB, not 0.1).
     """
@@ -48,8 +34,7 @@ def log_classifiers(
     )
     folder = Path(tempfile.mkdtemp())
     try:
-        _save(folder / NAME, about, _chosen(classifiers))
-        (folder / NAME / "model.skops").write_bytes(package.result())
+        _save(folder / NAME, about, classifiers)
         client.log_model_artifacts(entry.model_id, str(folder / NAME))
     finally:
         shutil.rmtree(folder, ignore_errors=True)
@@ -62,27 +47,23 @@ def _models(file: File) -> list[Any]:
     return read_models(file.path)
 
 
-def _chosen(classifiers: Classifiers) -> list[Any]:
-    return chosen(_models(classifiers.file), classifiers.features, classifiers.training_object)
-
-
-def _packed(classifiers: Classifiers) -> bytes:
-    return packed(_chosen(classifiers))
-
-
-def _save(folder: Path, about: Any, models: list[Any]) -> None:
-    """Save the first of them with what describes them all."""
+def _save(folder: Path, about: Any, classifiers: Classifiers) -> None:
     import mlflow.sklearn
+    import skops.io
     from mlflow.models import infer_signature
 
-    first, rows = ensemble(models[:1]), example(models)
+    models = chosen(_models(classifiers.file), classifiers.features, classifiers.training_object)
+    rows = example(models)
     mlflow.sklearn.save_model(
-        first,
+        ensemble(models[:1]),  # only what describes it is kept: packing all of them takes ten times as long
         str(folder),
         mlflow_model=about,
-        signature=infer_signature(rows, first.predict_proba(rows)),
+        signature=infer_signature(rows, probabilities(models, rows)),
         input_example=rows,
         pip_requirements=[f"{name}=={version(name)}" for name in REQUIRED],
         serialization_format="skops",
         pyfunc_predict_fn="predict_proba",
     )
+    # The least compression is a tenth larger and takes half as long.
+    packed = {"compression": zipfile.ZIP_DEFLATED, "compresslevel": 1}
+    skops.io.dump(ensemble(models), folder / "model.skops", **packed)

@@ -10,7 +10,7 @@ from typing import Any
 
 from pipeline.command import progress
 from pipeline.track.facts import sha256
-from pipeline.track.logged import Packages, log_classifiers, packing
+from pipeline.track.logged import log_classifiers
 from pipeline.track.runs import Data, File, Run, digest_of
 
 DEFAULT_DATABASE = "mlflow.db"
@@ -98,16 +98,15 @@ class Recorder:
             if run.info.status != "RUNNING":
                 return False
             self._forget(run.info.run_id)  # its writer was stopped on the way
-        call_id = self._begin(call, {"call.digest": digest}, {})
+        call_id = self._begin(call, {"call.digest": digest})
         known = {run.data.tags["fingerprint"] for run in self._known(call)}
         fresh = [run for run in call.nested if not run.fingerprint or run.fingerprint not in known]
-        with packing(run.classifiers for run in fresh if run.classifiers) as packages:
-            for run in progress(fresh, len(fresh), "track: runs"):
-                self._end(self._begin(run, {"mlflow.parentRunId": call_id}, packages), run)
+        for run in progress(fresh, len(fresh), "track: runs"):
+            self._end(self._begin(run, {"mlflow.parentRunId": call_id}), run)
         self._end(call_id, call)
         return True
 
-    def _begin(self, run: Run, tags: dict[str, str], packages: Packages) -> str:
+    def _begin(self, run: Run, tags: dict[str, str]) -> str:
         """Begin a run and write all that it says; return its id."""
         tags = {**run.tags, **tags, **_system_tags(run)}
         info = self.client.create_run(
@@ -115,7 +114,7 @@ class Recorder:
         ).info
         self._record(info.run_id, run)
         self._inputs(info.run_id, run)
-        self._attach(info.run_id, run, packages)
+        self._attach(info.run_id, run)
         return info.run_id
 
     def _end(self, run_id: str, run: Run) -> None:
@@ -142,7 +141,7 @@ class Recorder:
         if inputs:
             self.client.log_inputs(run_id, inputs)
 
-    def _attach(self, run_id: str, run: Run, packages: Packages) -> None:
+    def _attach(self, run_id: str, run: Run) -> None:
         """Attach texts, files and classifiers; a file that is not what it was is named in a tag instead."""
         for name, text in run.texts.items():
             self.client.log_text(run_id, text, name)
@@ -151,8 +150,7 @@ class Recorder:
             if file.path not in changed:
                 self.client.log_artifact(run_id, file.path, file.folder)
         if run.classifiers and _is_same(run.classifiers.file):
-            package = packages[run.classifiers]
-            log_classifiers(self.client, self.experiment_id, run_id, run.classifiers, package)
+            log_classifiers(self.client, self.experiment_id, run_id, run.classifiers)
         elif run.classifiers:
             changed.append(run.classifiers.file.path)
         if changed:

@@ -85,6 +85,21 @@ def _roc(curves: pd.DataFrame) -> list[tuple[str, float, int]]:
     ]
 
 
+def learning_curves(path: Path) -> list[tuple[str, float, int]]:
+    """Return scores by number of training trials, means over training objects and draws: the step is the number."""
+    table = read_table(path, "learning")
+    return [
+        (
+            f"classify.{row.experiment}.{row.features}.{row.split}.{name}_by_samples",
+            float(getattr(row, name)),
+            int(row.samples),
+        )
+        for row in table[table["replicate"] == 0].sort_values("samples").itertuples()
+        for name in ("auc", "tpr_at_fpr_01", "brier")
+        if getattr(row, name) == getattr(row, name)
+    ]
+
+
 def _data(processed: str | Path, experiment: str, training_object: str, objects: list[str]) -> list[Data]:
     paths = {name: Path(processed) / "simulate" / experiment / name / "trials.parquet" for name in objects}
     return [

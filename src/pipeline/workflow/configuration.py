@@ -65,8 +65,14 @@ def check_annotation(folder: str | Path, source: str) -> str:
 
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return ' (did you mean …?)' for the most similar of `known`, or nothing."""
-    close = difflib.get_close_matches(name, sorted(known), n=1, cutoff=0.6)
-    return f" (did you mean '{close[0]}'?)" if close else ""
+    written = {_plain(word): word for word in sorted(known)}
+    close = difflib.get_close_matches(_plain(name), written, n=1, cutoff=0.6)
+    return f" (did you mean '{written[close[0]]}'?)" if close else ""
+
+
+def _plain(name: str) -> str:
+    """Return a name without what people write in more than one way: My-Mug and my_mug are one."""
+    return name.lower().replace("-", "_")
 
 
 def _sentence(error: Any) -> str:

@@ -14,7 +14,7 @@ def main() -> None:
     parser.add_argument("--source", required=True, help="name of the annotated object")
     parser.add_argument("--objects", nargs="+", required=True, help="names of all objects that take part")
     parser.add_argument(
-        "--numbers", type=Path, nargs="+", required=True, help="metrics.json, evaluation.json"
+        "--numbers", type=Path, nargs="+", required=True, help="metrics.json, evaluation.json, execution.json"
     )
     parser.add_argument("--figures", type=Path, nargs="*", default=[], help="PDF files, in the page's order")
     parser.add_argument("--scans", type=Path, nargs="*", default=[], help="pages on the objects' scans, PNG")
@@ -31,12 +31,14 @@ def main() -> None:
     from pipeline.scene.pages import page
 
     names = sorted(options.objects, key=lambda name: name != options.source)  # the known one first
-    numbers = {key: value for path in options.numbers for key, value in read_json(path).items()}
+    read = [read_json(path) for path in options.numbers]
+    told = [row for numbers in read for row in numbers.pop("claims", [])]
+    numbers = {key: value for numbers in read for key, value in numbers.items()}
     html = page(
         "report/index/assets/index.html",
         headlines=headlines(numbers),
         scores=scores(numbers),
-        claims=claims(numbers.get("claims", [])),
+        claims=claims(told),
         figures=pictures(options.figures),
         scans=scans(options.scans),
         rows=rows(options.processed, options.source, names, options.uncertainties, numbers),
