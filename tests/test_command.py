@@ -3,6 +3,8 @@
 import threading
 import time
 
+import pytest
+
 from pipeline import command
 
 
@@ -30,4 +32,14 @@ def test_what_is_quick_says_nothing(capsys):
     with command.steps("fusing mug", 1) as tell:
         tell("reading")
     assert list(command.progress(range(1000), 1000, "numbers")) == list(range(1000))
+    assert capsys.readouterr().err == ""
+
+
+def test_ctrl_c_ends_a_program_without_a_word(capsys):
+    def interrupted():
+        raise KeyboardInterrupt
+
+    with pytest.raises(SystemExit) as ended:
+        command.run(interrupted)
+    assert ended.value.code == 130
     assert capsys.readouterr().err == ""

@@ -12,6 +12,7 @@ from typing import TypeVar
 from pipeline.errors import PipelineError
 
 T = TypeVar("T")
+STOPPED = 130  # what shells say of a program that Ctrl-C has ended
 
 
 def parser(doc: str | None) -> argparse.ArgumentParser:
@@ -22,12 +23,14 @@ def parser(doc: str | None) -> argparse.ArgumentParser:
 
 
 def run(main: Callable[[], None]) -> None:
-    """Call `main`; a `PipelineError` ends the program with its one sentence on stderr and exit code 1."""
+    """Call `main`; a `PipelineError` ends the program with its one sentence on stderr and exit code 1, Ctrl-C without a word."""
     try:
         main()
     except PipelineError as error:
         say(f"error: {error}")
         sys.exit(1)
+    except KeyboardInterrupt:
+        sys.exit(STOPPED)
 
 
 def say(message: str) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.artefacts import write_json
-from pipeline.command import parser, run
+from pipeline.command import parser, progress, run, steps
 
 COARSE_M = 0.03  # a spacing at which a vessel holds a few particles
 
@@ -46,8 +46,11 @@ def simulate() -> list[str]:
     lip, T_world_held, T_world_second = lip_alone(cylinder), np.eye(4), np.eye(4)
     T_world_held[2, 3] = 1.0
     axis = pour_axis(cylinder.opening_m, lip)
-    pouring.pour(vessel, 1, lip, axis, 0.1, 0)
-    filling.fill(vessel, vessel, T_world_held, T_world_second, lip, axis, 0.1, 1, 1, 0)
+    with steps("compiling simulate", 2) as tell:
+        tell("a pour")
+        pouring.pour(vessel, 1, lip, axis, 0.1, 0)
+        tell("a filling")
+        filling.fill(vessel, vessel, T_world_held, T_world_second, lip, axis, 0.1, 1, 1, 0)
     return names(rest.rest, pouring._pour, filling._fill)
 
 
@@ -77,7 +80,7 @@ def compiled(types: dict[Any, str]) -> list[str]:
     """Compile functions for the types of their arguments; return their names."""
     from numba.core.sigutils import normalize_signature
 
-    for function, arguments in types.items():
+    for function, arguments in progress(types.items(), len(types), "compiling fuse"):
         # Types, not their text: Numba's cache takes them for different keys.
         function.compile(normalize_signature(arguments)[0])
     return names(*types)

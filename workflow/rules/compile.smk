@@ -15,7 +15,7 @@ rule compile:
     priority: 3
     threads: 1
     shell:
-        "python -m pipeline.compile {wildcards.stage} --compiled {output.compiled:q} > {log:q} 2>&1"
+        "python -m pipeline.compile {wildcards.stage} --compiled {output.compiled:q} 2>&1 | tee {log:q} >&2"
 
 
 def compiled(stage):
