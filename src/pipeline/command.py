@@ -1,6 +1,8 @@
 """What every stage's `python -m pipeline.<stage>` shares: options, errors as one sentence, progress lines."""
 
 import argparse
+import os
+import signal
 import sys
 import threading
 import time
@@ -12,7 +14,6 @@ from typing import TypeVar
 from pipeline.errors import PipelineError
 
 T = TypeVar("T")
-STOPPED = 130  # what shells say of a program that Ctrl-C has ended
 
 
 def parser(doc: str | None) -> argparse.ArgumentParser:
@@ -23,14 +24,19 @@ def parser(doc: str | None) -> argparse.ArgumentParser:
 
 
 def run(main: Callable[[], None]) -> None:
-    """Call `main`; a `PipelineError` ends the program with its one sentence on stderr and exit code 1, Ctrl-C without a word."""
+    """Call `main`; a `PipelineError` ends the program with its one sentence on stderr and exit code 1.
+
+    Ctrl-C ends it by its signal, without a word.
+    """
     try:
         main()
     except PipelineError as error:
         say(f"error: {error}")
         sys.exit(1)
     except KeyboardInterrupt:
-        sys.exit(STOPPED)
+        # Ended by the signal, not by a number: a shell's loop about it ends, too.
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        os.kill(os.getpid(), signal.SIGINT)
 
 
 def say(message: str) -> None:

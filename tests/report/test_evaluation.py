@@ -109,7 +109,17 @@ def test_each_object_has_its_mean_over_the_others_as_trainer_and_as_test():
 
 def texts(figure) -> list[str]:
     """Return all texts of a figure's axes and margins."""
-    return [text.get_text() for text in (*figure.texts, *(t for axis in figure.axes for t in axis.texts))]
+    return [text.get_text() for text in written(figure)]
+
+
+def written(figure) -> list:
+    """Return all texts that a figure shows: its own, and of its axes also titles, labels of ticks and legends."""
+    every = [*figure.texts]
+    for axis in figure.axes:
+        ticks = [*axis.get_xticklabels(), *axis.get_yticklabels()] if axis.axison else []
+        legend = axis.get_legend()
+        every += [*axis.texts, axis.title, *ticks, *(legend.get_texts() if legend else [])]
+    return [text for text in every if text.get_text() and text.get_visible()]
 
 
 def test_both_warped_sets_are_tested_against_the_standard_one_on_the_page():
@@ -155,7 +165,7 @@ def test_nothing_leaves_the_paper(page):
         "claims": lambda: claims_page(by.claim_rows(all_values())),
     }[page]()
     figure.canvas.draw()
-    every = [*figure.texts, *(text for axis in figure.axes for text in axis.texts)]
+    every = written(figure)
     assert max(text.get_window_extent().x1 for text in every) < 0.985 * figure.bbox.width
     assert min(text.get_window_extent().y0 for text in every) > 0.005 * figure.bbox.height
 

@@ -205,7 +205,7 @@ def test_a_call_that_was_stopped_while_it_compiled_is_taken_up_to_its_end(projec
     assert {"compile simulate", "report"} <= project.planned("reports/roc.pdf")
 
 
-def test_functions_that_were_compiled_again_rerun_nothing(project):
+def test_a_touched_file_of_what_is_compiled_reruns_nothing(project):
     (project / "data/processed/compile/fuse.json").touch()
     assert project.planned() == set()
 

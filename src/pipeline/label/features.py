@@ -46,8 +46,8 @@ def _moments(
     """Return of a group's points the mean (M, K, 3) of their neighbours as seen from each, their covariance (M, K, 3, 3), and
     the distance (M, K) of the furthest, for each of K numbers of neighbours.
 
-    One search for a whole group, as the trees of SciPy, scikit-learn and Open3D, which look for each point's by itself, make the
-    features, the same to 1e-14, cost 2.0 to 2.7 times the processor time (three clouds of 12,000 points). The nearest of any are
+    One search for a whole group: with trees (SciPy, scikit-learn, Open3D), which search for each point by itself, the features are
+    the same to 1e-14 and take 2.0 to 2.7 times the processor time (three clouds of 12,000 points). The nearest of any are
     within R + 2 r of the group's middle, whose own nearest are within R, where r is how far the group reaches.
     """
     ends = np.minimum(neighbours, len(points_m)) - 1

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 NOTE = (
     "Intervals are a bootstrap's over objects; not sure: the interval has both answers. Areas nearer than 0.01 count as alike.\n"
-    "Section IV-B, the robot: reports/execution.pdf."
+    "Section IV-B, the robot: reports/execution.pdf, where there are demonstrations."
 )
 
 

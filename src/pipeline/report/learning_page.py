@@ -36,7 +36,7 @@ def learning_page(learning: "pd.DataFrame", experiments: list[str], numbers: Map
                 # Rates at 1 % are so far below their ceiling that its line would flatten the curves.
                 if measure == "auc" and ceiling is not None:
                     axis.axhline(ceiling, color=COLOURS["hydrostatic"], lw=1, ls=":")
-                _separable(axes[-1, column], rows)
+            _separable(axes[-1, column], rows)
         legend(figure, SETS[:3], dotted=SETS[3:])
         figure.text(0.06, 0.015, _note(numbers, experiments), fontsize=6.5, va="bottom")
         figure.suptitle("Learning curves", y=0.975, fontsize=10)

@@ -13,9 +13,11 @@ from pipeline.report.execution_numbers import PAIR, clustered
 
 FEATURES = "label_mapping"
 NOTE = (
-    "By label mapping; intervals are a bootstrap's over pairs; not sure: the interval has both answers. What holds is our reading: "
-    "nine pours of ten;\ntwo balls; the share that lies beyond two standard deviations; more than half of the pours."
+    "By label mapping; intervals are a bootstrap's over pairs; not sure: the interval has both answers. What holds is our "
+    "reading:\nnine pours of ten; three balls in the paper's thirty; beyond two standard deviations; more than half of the pours."
 )
+COUPLE = 3 / 30  # balls a pour
+BEYOND_TWO_DEVIATIONS = 0.023  # of a normal distribution, on one side of the paper's shaded region
 
 
 @dataclass(frozen=True)
@@ -42,21 +44,19 @@ CLAIMS = (
         "only a couple of gel balls were spilled during the experiments",
         "novel pairs: balls beside the target, a pour",
         "n_spilled",
-        lambda x: x <= 2.0,
+        lambda x: x <= COUPLE,
     ),
     Claim(
         "robot_keeps_below_one",
         "the distribution over trajectories remains safely below this value [one] until the lip point is above the opening",
-        "share of drawn trajectories that tilt above one before the lip has come above the opening",
+        "all pairs: share of drawn trajectories that tilt above one before the lip has come above the opening",
         "way_in",
-        lambda x: (
-            x <= 0.023
-        ),  # of a normal distribution beyond two standard deviations, the paper's shaded region
+        lambda x: x <= BEYOND_TWO_DEVIATIONS,
     ),
     Claim(
         "robot_pours_near_the_rim",
         "the cup was often placed close to the rim of the second container",
-        "share of pours whose lip is nearer to the rim than to the centre of the opening when the first ball drops",
+        "all pairs: share of pours whose lip is nearer to the rim than to the centre of the opening when the first ball drops",
         "near_rim",
         lambda x: x > 0.5,
     ),
@@ -71,7 +71,7 @@ def claim_rows(
     demonstrated: tuple[str, str],
 ) -> pd.DataFrame:
     """Return a row a claim, with the columns of `evaluation_numbers.claim_rows`; `safety` is that of drawn trajectories."""
-    pours = executions[executions["features"] == FEATURES]
+    pours = executions[(executions["features"] == FEATURES) & (executions["cause"] != "arm")]
     novel = pours[(pours["held_object"] + "/" + pours["target_object"]) != "/".join(demonstrated)]
     pours = pours.assign(near_rim=near_rim(pours, trajectories, parameters))
     tables = {
@@ -84,7 +84,7 @@ def claim_rows(
 
 
 def near_rim(pours: pd.DataFrame, trajectories: pd.DataFrame, parameters: pd.DataFrame) -> np.ndarray:
-    """Return of each pour 1 if its lip is 0.5 to 1.5 radii off the opening's axis at the first drop, else 0; nan without a drop."""
+    """Return of each pour 1 if its lip is nearer to the rim than to the opening's axis at the first drop, else 0, or nan."""
     radius_m = parameters[parameters["mapping"] == FEATURES].set_index("object")["radius_m"]
     runs = dict(list(trajectories[trajectories["features"] == FEATURES].groupby([*PAIR, "draw"])))
     found = []
@@ -95,7 +95,7 @@ def near_rim(pours: pd.DataFrame, trajectories: pd.DataFrame, parameters: pd.Dat
             continue
         at = run.iloc[int(np.argmin(np.abs(run["t_s"].to_numpy() - pour.first_drop_s)))]
         off = np.hypot(at["lip_x_m"], at["lip_y_m"]) / radius_m[pour.target_object]
-        found.append(float(0.5 < off < 1.5))
+        found.append(float(off > 0.5))
     return np.array(found)
 
 

@@ -173,10 +173,10 @@ def matrices(found: Scores) -> "Figure":
             axis.set_axis_off()
         for axis in axes.flat[len(MEASURES) - COLUMNS : len(MEASURES)]:
             axis.tick_params(labelbottom=True)
+            # Above an empty panel names hang into it: no gap between the rows.
+            of_last_row = axis in axes[-1]
             for label in axis.get_xticklabels():
-                label.set_in_layout(
-                    axis in axes[-1]
-                )  # above an empty panel they hang into it: no gap between the rows
+                label.set_in_layout(of_last_row)
         figure.suptitle(
             "Every target by itself; the darker, the worse; –: there is no such number", fontsize=9
         )

@@ -103,5 +103,5 @@ def _note(call: Call, failed: list[Failure]) -> str:
     if call.status == "success":
         return objects
     lines = [f"- `{failure.rule}`: {failure.reason} ({', '.join(failure.logs)})" for failure in failed]
-    head = "Stopped by its user, while there ran:" if stopped(call.logs) else "Failed:"
-    return "\n".join([head, *(lines or ["- no job failed: the call was stopped"]), "", objects])
+    head = "Stopped by its user. Ended without their outputs:" if stopped(call.logs) else "Failed:"
+    return "\n".join([head, *(lines or ["- no job"]), "", objects])

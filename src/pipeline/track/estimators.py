@@ -16,12 +16,12 @@ CLASSES = np.array([False, True])
 
 def pipeline_of(model: Model) -> Pipeline:
     """Return one classifier: standardise, perhaps squares and products, logistic regression; classes are False and True."""
-    unfitted = _unfitted(model)
-    _fill_scaler(unfitted[0], model)
+    pipeline = _unfitted(model)
+    _fill_scaler(pipeline[0], model)
     if model.terms != "linear":
-        unfitted[1].fit(np.zeros((1, len(model.feature_names))))
-    _fill_regression(unfitted[-1], model)
-    return unfitted
+        pipeline[1].fit(np.zeros((1, len(model.feature_names))))
+    _fill_regression(pipeline[-1], model)
+    return pipeline
 
 
 def _unfitted(model: Model) -> Pipeline:

@@ -32,7 +32,9 @@ def fit(
     A source without a handle knows of none: what it cannot know of the target (`Warp.is_known`) is left out.
     """
     warp = _fitted(source, target, refinements, bends)
-    for _ in range(0 if source.parts[:, 2].any() else TRIMS):
+    for _ in range(TRIMS):
+        if warp.is_known.all():
+            break
         trimmed = subset(target, np.flatnonzero(warp.is_known))
         warp = replace(_fitted(source, trimmed, refinements, bends), target=target)
     return replace(warp, diagnostics={"refinements": float(refinements), "bends": float(bends)})

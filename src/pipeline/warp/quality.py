@@ -14,8 +14,9 @@ WALL_COSINE = (
 
 def quality(warp: Warp, mapped: Mapped) -> dict[str, float]:
     """Return mean distance of the pairs (m), shares without candidate, of flipped walls, and of the target reached."""
+    counted = mapped.valid & warp.is_known[mapped.target_index]
     return {
-        "residual_m": float(np.mean(mapped.distance_m[mapped.valid])),
+        "residual_m": float(np.mean(mapped.distance_m[counted])),
         "share_without_candidate": float(np.mean(~mapped.valid)),
         "wall_side_flips": wall_side_flips(warp, mapped.source_index, mapped.target_index),
         "share_of_target_reached": len(np.unique(mapped.target_index[mapped.valid]))

@@ -31,28 +31,28 @@ class Roll:
 def roll(cloud: Cloud, origin_m: np.ndarray, ring_m: np.ndarray) -> Roll:
     """Return the roll of a container about the vertical through its middle (3,), with a rim ring (M, 3).
 
-    Where several directions are equally right, the one nearest to that in which its own points lean is taken: whichever way the
-    object was turned on the table, it is met in the same way.
+    Where several directions are equally right, the one nearest to the skewness of its own points is taken: however its cloud
+    is turned, it is met in the same way.
     """
-    leaning_rad = _leaning(cloud.points_m)
+    skew_rad = _skew_azimuth(cloud.points_m)
     found = _handles(cloud, origin_m, ring_m)
     if found:
         alike = [rows for rows in found if len(rows) >= ALIKE * len(found[0])]
         towards = [_horizontal(cloud.points_m[rows].mean(axis=0) - origin_m) for rows in alike]
-        leaning = _horizontally(leaning_rad)
-        return Roll(max(towards, key=lambda axis: axis @ leaning), 1, len(found))
-    azimuth_rad, symmetry = outline(ring_m, leaning_rad)
-    return Roll(_horizontally(azimuth_rad), symmetry, 0)
+        skew = _unit_vector(skew_rad)
+        return Roll(max(towards, key=lambda axis: axis @ skew), 1, len(found))
+    azimuth_rad, symmetry = outline(ring_m, skew_rad)
+    return Roll(_unit_vector(azimuth_rad), symmetry, 0)
 
 
-def _leaning(points_m: np.ndarray) -> float:
+def _skew_azimuth(points_m: np.ndarray) -> float:
     """Return the azimuth (rad) of the skewness of points (N, 3) across the vertical: on a round object, of chance alone."""
     flat = points_m[:, :2] - points_m[:, :2].mean(axis=0)
     skewness = (flat**2).sum(axis=1) @ flat
     return float(np.arctan2(skewness[1], skewness[0]))
 
 
-def _horizontally(azimuth_rad: float) -> np.ndarray:
+def _unit_vector(azimuth_rad: float) -> np.ndarray:
     return np.array([np.cos(azimuth_rad), np.sin(azimuth_rad), 0.0])
 
 
@@ -116,14 +116,14 @@ def _outside_wall(cloud: Cloud, rows: np.ndarray, origin_m: np.ndarray, outward:
     return (outward[rows] < -0.5) & np.isfinite(distance_m).any(axis=1)
 
 
-def outline(ring_m: np.ndarray, leaning_rad: float) -> tuple[float, int]:
+def outline(ring_m: np.ndarray, skew_rad: float) -> tuple[float, int]:
     """Return the azimuth (rad) and the symmetry of a rim seen from above: points (M, 3).
 
-    The azimuth is that of the corner nearest to `leaning_rad`; of a single bulge, a spout, that of the opposite side, where
-    handles are; and on a round rim `leaning_rad` itself.
+    The azimuth is that of the corner nearest to `skew_rad`; of a single bulge, a spout, that of the opposite side, where
+    handles are; and on a round rim `skew_rad` itself.
     """
     offset = ring_m[:, :2] - _middle(ring_m[:, :2])
-    azimuth = (np.arctan2(offset[:, 1], offset[:, 0]) - leaning_rad) % (2 * np.pi)
+    azimuth = (np.arctan2(offset[:, 1], offset[:, 0]) - skew_rad) % (2 * np.pi)
     centres = (np.arange(SECTORS) + 0.5) * 2 * np.pi / SECTORS
     sector = np.minimum((azimuth / (2 * np.pi) * SECTORS).astype(int), SECTORS - 1)
     count = np.bincount(sector, minlength=SECTORS)
@@ -131,15 +131,15 @@ def outline(ring_m: np.ndarray, leaning_rad: float) -> tuple[float, int]:
     profile = np.interp(centres, centres[count > 0], mean_m[count > 0], period=2 * np.pi)
     profile = np.mean([np.roll(profile, shift) for shift in (-1, 0, 1)], axis=0) / np.median(profile) - 1.0
     if np.std(profile) < ROUND_SHARE:
-        return leaning_rad, 0
+        return skew_rad, 0
     repeats = [m for m in (4, 3, 2) if np.corrcoef(profile, np.roll(profile, SECTORS // m))[0, 1] > REPEATS]
     symmetry = repeats[0] if repeats else 1
     excess = np.maximum(profile, 0.0)
     phase = np.angle(np.sum(excess * np.exp(1j * symmetry * centres))) / symmetry
     if symmetry == 1:
-        return float(leaning_rad + phase + np.pi), 1
+        return float(skew_rad + phase + np.pi), 1
     turns = phase + 2 * np.pi * np.arange(symmetry) / symmetry
-    return float(leaning_rad + turns[np.argmax(np.cos(turns))]), symmetry
+    return float(skew_rad + turns[np.argmax(np.cos(turns))]), symmetry
 
 
 def _middle(ring_m: np.ndarray) -> np.ndarray:

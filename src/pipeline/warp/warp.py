@@ -12,7 +12,7 @@ from pipeline.warp.deformation import Deformation
 from pipeline.warp.nearest import agreeing_neighbours, majority_of_neighbours, mean_of_neighbours
 from pipeline.warp.roll import standing_off
 
-FAR = 0.1  # from here on, in spreads of the container, nothing of the source is near
+FAR = 0.1  # further than this, in spreads of the container, a pair is no pair
 
 
 @dataclass(frozen=True)
@@ -52,17 +52,19 @@ class Warp:
         """Which of the source's points (N,) the target can have, too: all but a handle's, where no handle was found."""
         return ~self.source.parts[:, 2] | (self.target_frame.handles > 0)
 
-    @property
+    @cached_property
     def is_known(self) -> np.ndarray:
         """Which of the target's points (M,) the source can have, too.
 
-        All, where it has a handle itself; else what stands off the target's body far from all of the source is that of the target.
+        All, where it has a handle itself; else not what stands off the target's body, is no rim by its initial labels, and is far
+        from all points of the source with an agreeing normal.
         """
         if self.source.parts[:, 2].any():
             return np.ones(len(self.target.points_m), dtype=bool)
         off, _ = standing_off(self.target, self.target_frame.T_object_part[:3, 3])
         spread_m = np.linalg.norm(self.target_frame.spread_m)
-        return ~(off & (label_pairs(self, 1)[1][:, 0] > FAR * spread_m))
+        far = label_pairs(self, 1)[1][:, 0] > FAR * spread_m
+        return ~(off & far & ~self.target.parts[:, 1])
 
     @property
     def source_index(self) -> np.ndarray:
@@ -135,9 +137,14 @@ class Warp:
 
 
 def point_pairs(warp: Warp, k: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return for each source point the k nearest target points with an agreeing normal: rows (N, k), distances (N, k)."""
-    aligned, target = warp.aligned, warp.target
-    return agreeing_neighbours(aligned.points_m, aligned.normals, target.points_m, target.normals, k)
+    """Return for each source point the k nearest target points with an agreeing normal: rows (N, k), distances (N, k).
+
+    Those that the source cannot know are none.
+    """
+    aligned, rows = warp.aligned, np.flatnonzero(warp.is_known)
+    near = subset(warp.target, rows)
+    index, distance = agreeing_neighbours(aligned.points_m, aligned.normals, near.points_m, near.normals, k)
+    return np.where(index >= 0, rows[index], -1), distance
 
 
 def label_pairs(warp: Warp, k: int) -> tuple[np.ndarray, np.ndarray]:
