@@ -36,8 +36,10 @@ def _within(points_m: np.ndarray, hull: ConvexHull) -> np.ndarray:
     """Return which of points (N, 3) are in a hull."""
     facets = np.unique(hull.equations.round(9), axis=0)
     inside = np.ones(len(points_m), bool)
-    for some in np.array_split(facets, max(1, len(facets) // 64)):
-        rows = np.flatnonzero(inside)
+    parts = max(1, len(facets) // 64)
+    for part in range(parts):
+        # Facets of all sides at a time: what is outside drops out soon.
+        some, rows = facets[part::parts], np.flatnonzero(inside)
         inside[rows] = (points_m[rows] @ some[:, :3].T + some[:, 3] <= 0.0).all(axis=1)
     return inside
 
