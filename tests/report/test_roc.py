@@ -24,6 +24,17 @@ def test_draws_are_averaged_within_an_object_before_objects_are():
     np.testing.assert_allclose(mean_curves(curves)["mean"], [0.2, 0.5, 1.0])
 
 
+def test_bands_are_over_draws_and_objects():
+    curves = pd.concat(
+        curve(cup, draw_number, [tpr, tpr, 1.0])
+        for cup, every in {"cup": [0.0, 0.4], "bowl": [0.1, 0.2, 0.3]}.items()
+        for draw_number, tpr in enumerate(every)
+    )
+    found = mean_curves(curves)
+    np.testing.assert_allclose(found["low"], [0.1, 0.1, 1.0])
+    np.testing.assert_allclose(found["high"], [0.3, 0.3, 1.0])
+
+
 def test_the_figure_is_the_same_bytes_for_the_same_curves(tmp_path):
     curves = curve("cup", 0, [0.2, 0.8, 1.0])
     scores = pd.DataFrame({"experiment": ["pouring"], "features": "standard", "split": "novel", "auc": 0.8})

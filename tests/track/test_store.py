@@ -172,7 +172,9 @@ def test_a_call_that_its_user_stopped_says_so(tmp_path):
     )
     assert end(folder, "failed", time.time() + 60) == (0, "", "")
     note = _runs(folder, "call")[1][0].data.tags["mlflow.note.content"]
-    assert note.startswith("Stopped by its user. Ended without their outputs:\n- `fuse`: ended without a word")
+    assert note.startswith(
+        "Stopped by its user. Ended without their outputs:\n- `fuse`: ended without a word"
+    )
 
 
 @pytest.mark.parametrize("uri", ["nonsense://nowhere", "http://127.0.0.1:9"])

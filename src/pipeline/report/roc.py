@@ -34,20 +34,19 @@ def main() -> None:
 
 
 def mean_curves(curves: "pd.DataFrame") -> "pd.DataFrame":
-    """Return mean, lower and upper quartile of the TPR over training objects, at each fixed FPR.
+    """Return the mean of the TPR, and its lower and upper quartile over draws and training objects, at each fixed FPR.
 
-    Draws are averaged within a training object first. Scores of different classifiers are never pooled.
+    The mean is over an object's draws first. Scores of different classifiers are never pooled.
     """
     keys = ["experiment", "features", "split", "fpr"]
     by_object = curves.groupby([*keys, "training_object"], observed=True)["tpr"].mean()
-    grouped = by_object.groupby(keys, observed=True)
-    return grouped.agg(
-        mean="mean", low=lambda x: x.quantile(0.25), high=lambda x: x.quantile(0.75)
-    ).reset_index()
+    of_all = curves.groupby(keys, observed=True)["tpr"]
+    means = by_object.groupby(keys, observed=True).mean().to_frame("mean")
+    return means.assign(low=of_all.quantile(0.25), high=of_all.quantile(0.75)).reset_index()
 
 
 def draw(curves: "pd.DataFrame", scores: "pd.DataFrame") -> "Figure":
-    """Return the figure: a panel an experiment, bands from quartile to quartile over the training objects."""
+    """Return the figure: a panel an experiment, bands from quartile to quartile over draws and training objects."""
     import matplotlib.pyplot as plt
 
     from pipeline.report.style import RC
