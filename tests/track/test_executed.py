@@ -90,6 +90,11 @@ def test_the_same_executions_are_no_runs_again_and_none_are_told_of_a_call_witho
     assert len(_found(executed)[1]) == len(SETS)
     old = time.time() - 3600
     os.utime(executed / "processed/execute/executions.parquet", (old, old))
-    (executed / "processed/execute/mug/jug/label_mapping/film.gif").write_bytes(b"GIF89b")
+    film = executed / "processed/execute/mug/jug/label_mapping/film.gif"
+    film.write_bytes(b"GIF89b")
+    os.utime(film, (old, old))
     assert end(executed, "success", time.time() - 60) == (0, "", "")
     assert len(_found(executed)[1]) == len(SETS)
+    os.utime(film)
+    assert end(executed, "success", time.time() - 60) == (0, "", "")
+    assert len(_found(executed)[1]) == len(SETS) + 1  # with the film that was made since

@@ -91,10 +91,11 @@ def _classifiers(call: Call, flat: dict[str, Any]) -> list[Run]:
 
 
 def _executions(call: Call, flat: dict[str, Any]) -> list[Run]:
-    """Return the runs of the robot's executions, if this call made them or their report."""
-    path = Path(call.processed) / "execute/executions.parquet"
-    fresh = path.is_file() and facts.made(Path(call.reports) / "execution.pdf", call.since_s)
-    return executed_runs(call.processed, flat) if fresh or facts.made(path, call.since_s) else []
+    """Return the runs of the robot's executions, if this call made them, their report or a film of them."""
+    folder = Path(call.processed) / "execute"
+    path, report = folder / "executions.parquet", Path(call.reports) / "execution.pdf"
+    fresh = any(facts.made(file, call.since_s) for file in (path, report, *folder.glob("*/*/*/film.gif")))
+    return executed_runs(call.processed, flat) if fresh and path.is_file() else []
 
 
 def _note(call: Call, failed: list[Failure]) -> str:
