@@ -29,7 +29,13 @@ def _options() -> argparse.Namespace:
 
 def fuse() -> list[str]:
     """Compile what fusion computes voxel by voxel and vertex by vertex; return the functions' names."""
-    return compiled(fuse_types())
+    from numba.core.sigutils import normalize_signature
+
+    types = fuse_types()
+    for function, arguments in progress(types.items(), len(types), "compiling fuse"):
+        # Types, not their text: Numba's cache takes them for different keys.
+        function.compile(normalize_signature(arguments)[0])
+    return names(*types)
 
 
 def simulate() -> list[str]:
@@ -74,16 +80,6 @@ def fuse_types() -> dict[Any, str]:
         smoothing.smoothed: f"({points}, i4[::1], i4[::1], {points}, i8, UniTuple(f8, 2))",
         sampling._eliminate: "(i8[::1], i8[::1], f8[::1], i8)",
     }
-
-
-def compiled(types: dict[Any, str]) -> list[str]:
-    """Compile functions for the types of their arguments; return their names."""
-    from numba.core.sigutils import normalize_signature
-
-    for function, arguments in progress(types.items(), len(types), "compiling fuse"):
-        # Types, not their text: Numba's cache takes them for different keys.
-        function.compile(normalize_signature(arguments)[0])
-    return names(*types)
 
 
 def names(*functions: Any) -> list[str]:

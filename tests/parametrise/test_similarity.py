@@ -115,6 +115,21 @@ def test_at_another_size_the_rim_is_nearer_to_that_of_4_mm_than_the_same_labels_
     assert iou(labelled(resized)[:, 1], true) > iou(as_sampled(name)[0][:, 1], true) + 0.05
 
 
+@pytest.mark.parametrize("name", ["jug", "square_bowl", "wide_bowl", "tumbler"])
+@pytest.mark.parametrize("scale", [0.5, 2.0])
+def test_at_another_size_few_labels_change(name, scale):
+    assert changed(labelled(moved(body(name), 0.4, scale, (0.1, 0.1, 0.0))), as_sampled(name)[0]) < 0.05
+
+
+@pytest.mark.xfail(
+    reason="3.1 mm become 1.9: of 4,000 points few lie in the spout, and the contour's sectors stand still",
+    strict=True,
+)
+def test_a_spout_is_as_deep_whatever_its_yaw():
+    _, there = read_off(moved(body("jug"), 0.04125844269912404, 1.0, (0.0, 0.0, 0.0)))
+    assert there["spout_depth_m"] == pytest.approx(as_sampled("jug")[1]["spout_depth_m"], abs=1e-3)
+
+
 def scales(there: dict, elsewhere: dict, scale: float, shift_m: np.ndarray, within: float) -> None:
     """Assert that every parameter scales as its unit says, and moves with the object where it is a place."""
     for found in PARAMETERS.values():

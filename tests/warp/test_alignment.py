@@ -188,7 +188,7 @@ def test_an_oval_has_two_rolls_along_its_length():
     angle = np.linspace(0, 2 * np.pi, 500, endpoint=False)
     ring = np.column_stack([0.06 * np.cos(angle), 0.04 * np.sin(angle), np.zeros(500)])
     R = rotation_about(np.array(UP), 0.6)
-    for leaning_rad, nearest_rad in ((0.3, 0.6), (3.0, 0.6 + np.pi)):
-        turn, symmetry = outline(ring @ R.T, leaning_rad)
+    for skew_rad, nearest_rad in ((0.3, 0.6), (3.0, 0.6 + np.pi)):
+        turn, symmetry = outline(ring @ R.T, skew_rad)
         assert symmetry == 2
         assert angle_between(turn, nearest_rad) < 0.01

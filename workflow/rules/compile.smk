@@ -21,6 +21,6 @@ rule compile:
 def compiled(stage):
     """Return what tells that a stage's functions are compiled; a file that is touched or copied reruns nothing.
 
-    Not ancient(): when such a file is to be made again, Snakemake 9.27 makes it and forgets all that waits for it. Now that runs, too.
+    Not ancient(): when such a file is to be made again, Snakemake 9.27 makes it and forgets all that waits for it; without it, that runs, too.
     """
     return expand(rules.compile.output.compiled, stage=stage)

@@ -30,6 +30,13 @@ class Claim:
     why: str = ""
 
 
+def answer(holds: Callable[[float], bool], value: float, low: float, high: float) -> dict[str, Any]:
+    """Return a claim's number with its interval, whether it holds, and whether the whole interval is on one side (`sure`)."""
+    held = bool(holds(value))
+    sure = all(bool(holds(end)) == held for end in (low, high))
+    return {"value": value, "low": low, "high": high, "holds": held, "sure": sure}
+
+
 def claims(metrics: Metrics) -> dict[str, float]:
     """Return `claims.<name>` (the number) and `claims.<name>.holds` (1 or 0) of each claim that the metrics can tell."""
     found: dict[str, float] = {}

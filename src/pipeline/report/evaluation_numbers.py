@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline.report.claims import CLAIMS
+from pipeline.report.claims import CLAIMS, answer
 from pipeline.statistics.delong import NORMAL_95, delong_std
 from pipeline.statistics.rates import weighted_rates
 from pipeline.statistics.resampling import COLUMNS, Resampled, interval, two_sided_p
@@ -186,11 +186,7 @@ def claim_rows(values: Mapping[str, np.ndarray]) -> pd.DataFrame:
         value, low, high = interval(numbers) if len(numbers) > 1 else (float(numbers[0]),) * 3
         if not np.isfinite([value, low, high]).all():
             continue  # too few objects, or one of them has one outcome only
-        holds = bool(claim.holds(value))
-        sure = all(bool(claim.holds(end)) == holds for end in (low, high))
+        answered = answer(claim.holds, value, low, high)
         head = {"name": claim.name, "section": claim.section, "words": claim.words, "measure": claim.measure}
-        rows.append(
-            {**head, "value": value, "low": low, "high": high, "holds": holds, "sure": sure}
-            | {"why": "" if holds else claim.why}
-        )
+        rows.append({**head, **answered, "why": "" if answered["holds"] else claim.why})
     return pd.DataFrame(rows)

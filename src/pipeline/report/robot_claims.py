@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from pipeline.report.claims import answer
 from pipeline.report.execution_numbers import PAIR, clustered
 
 FEATURES = "label_mapping"
@@ -101,10 +102,5 @@ def near_rim(pours: pd.DataFrame, trajectories: pd.DataFrame, parameters: pd.Dat
 
 def _row(claim: Claim, table: pd.DataFrame) -> dict:
     value = float(table.groupby(PAIR)[claim.column].mean().mean())
-    low, high = clustered(table, claim.column)
-    holds = bool(claim.holds(value))
-    return {
-        **{"name": claim.name, "section": "IV-B", "words": claim.words, "measure": claim.measure},
-        **{"value": value, "low": low, "high": high, "holds": holds},
-        **{"sure": all(bool(claim.holds(end)) == holds for end in (low, high)), "why": ""},
-    }
+    head = {"name": claim.name, "section": "IV-B", "words": claim.words, "measure": claim.measure}
+    return {**head, **answer(claim.holds, value, *clustered(table, claim.column)), "why": ""}
