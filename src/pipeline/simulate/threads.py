@@ -16,7 +16,7 @@ def _trial(r, t):
             r.v[t, i, c] = 0.0
     return Particles(
         r.x[t], r.v[t], r.impulse[t], r.count[t], r.gone_x[t], r.gone_v[t], r.gone_how[t],
-        r.spare_x[t], r.spare_v[t], r.spare_impulse[t], r.bin_of[t], r.bin_start[t], r.first[t],
+        r.spare_x[t], r.spare_v[t], r.spare_impulse[t], r.bin_of[t], r.bin_start[t], r.rows[t], r.first[t],
         r.other[t], r.weight[t], r.factor[t], r.slope[t], r.sums[t], r.wall[t], r.change[t],
     )  # fmt: skip
 
