@@ -100,7 +100,7 @@ def test_a_cup_alone_pours_over_its_own_lip_downwards(oval, pourings):
 
 
 def test_fillings_are_uniform_in_offset_height_and_yaw(bowl, fillings):
-    radius = draws.opening_radius_m(bowl)
+    radius = bowl.opening_radius_m
     assert 0.0515 < radius < 0.0555  # between the wall's two edges
     assert_uniform([d.dx_m / radius for d in fillings], -1.5, 1.5)
     assert_uniform([d.dy_m / radius for d in fillings], -1.5, 1.5)
@@ -155,7 +155,7 @@ def test_the_lip_is_the_rim_point_nearest_to_the_second_on_approach(oval, bowl, 
     for draw in fillings[:100]:
         along = np.cross(draw.axis_world, [0, 0, 1])
         back = draw.T_world_held.copy()
-        wanted = bowl.opening_m - 1.5 * draws.opening_radius_m(bowl) * along + [0, 0, draw.dz_m]
+        wanted = bowl.opening_m - 1.5 * bowl.opening_radius_m * along + [0, 0, draw.dz_m]
         back[:3, 3] += wanted - draw.lip_world
         distances = np.linalg.norm(frames.apply(back, rim) - bowl.opening_m, axis=1)
         lip = np.linalg.norm(frames.apply(back, draw.lip_m) - bowl.opening_m)

@@ -5,6 +5,7 @@ is inside is decided by what encloses it and by what can be seen from there, nev
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -39,6 +40,11 @@ class Cavity:
     rim_m: np.ndarray
     opening_m: np.ndarray
     capacity_m3: float
+
+    @cached_property
+    def opening_radius_m(self) -> float:
+        """The mean distance of the rim's points to their mean, the paper's radius (Section II-D)."""
+        return float(np.linalg.norm(self.rim_m - self.opening_m, axis=1).mean())
 
     def rim_at(self, x_m: np.ndarray, y_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the rim's horizontal distance from the opening and its height in the direction of (x, y)."""

@@ -4,6 +4,8 @@ The second container is a static concave mesh. The held one is a compound of con
 collide two concave meshes): cells of azimuth × height (squares on the floor), split again where a handle stands off the wall.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 import pybullet
 
@@ -22,7 +24,8 @@ _TRIANGLE_M2 = 3.5e-5
 _TRIANGLES = (400, 1600)
 _MANY, _MERGED_M = 20, 0.0015
 _DIRECTIONS = 96
-_SCOUT_STRIDE = 4  # a quarter of the pieces finds most contacts at the start, at a quarter of the cost
+# Every so many pieces: few of them find most contacts at the start, at a fraction of the cost.
+_SCOUT_STRIDES = (16, 4)
 # Bullet's motion in steps: never further than the gap allows, never finer than this.
 _FINEST_STEP_M = 0.0015
 _LOOK_AHEAD_M = (0.003, 0.012)  # how far Bullet looks for the other container
@@ -34,7 +37,8 @@ class Containers:
     def __init__(self) -> None:
         self._client = pybullet.connect(pybullet.DIRECT)
         self._hull_m: dict[int, np.ndarray] = {}
-        self._scout: dict[int, int] = {}
+        self._pose: dict[int, np.ndarray] = {}
+        self._scouts: dict[int, list[int]] = {}
 
     def __enter__(self) -> "Containers":
         return self
@@ -58,7 +62,7 @@ class Containers:
         from scipy.spatial import ConvexHull
 
         body = self._compound(pieces)
-        self._scout[body] = self._compound(pieces[::_SCOUT_STRIDE])
+        self._scouts[body] = [self._compound(pieces[::stride]) for stride in _SCOUT_STRIDES]
         points = np.concatenate(pieces)
         self._hull_m[body] = points[ConvexHull(points).vertices]
         return body
@@ -68,8 +72,15 @@ class Containers:
         return pybullet.createMultiBody(1.0, shape, physicsClientId=self._client)
 
     def move(self, body: int, T_world_body: np.ndarray) -> None:
-        """Put a body at a pose (4, 4)."""
-        bodies.place(body, T_world_body, self._client)
+        """Put a body at a pose (4, 4), unless it is there."""
+        if not np.array_equal(self._pose.get(body), T_world_body):
+            bodies.place(body, T_world_body, self._client)
+            self._pose[body] = T_world_body.copy()
+
+    def _put(self, body: int, at_m: Sequence[float], turned: Sequence[float]) -> None:
+        """Put a body at a place (3,) and a quaternion (4,)."""
+        self._pose.pop(body, None)
+        pybullet.resetBasePositionAndOrientation(body, at_m, turned, physicsClientId=self._client)
 
     def gap_m(self, held: int, second: int, look_ahead_m: float = 0.02) -> float:
         """Return the distance between two bodies where they are (negative: they overlap); at most `look_ahead_m`."""
@@ -94,16 +105,18 @@ class Containers:
         that nothing is jumped over, down to steps of 1.5 mm, half a thin wall.
         """
         self.move(second, T_world_second)
-        self.move(self._scout[held], T_world_held)
-        if self.gap_m(self._scout[held], second, 0.0) < 0.0:
-            return True
+        turned = bodies.quaternion(T_world_held[:3, :3])
+        for scout in self._scouts[held]:
+            self._put(scout, T_world_held[:3, 3].tolist(), turned)
+            if self.gap_m(scout, second, 0.0) < 0.0:
+                return True
         arm_m = self._arm_m(held, T_world_held, lip_world, axis_world)
-        from_lip = (T_world_held[:3, 3] - lip_world).tolist(), bodies.quaternion(T_world_held[:3, :3])
+        from_lip = (T_world_held[:3, 3] - lip_world).tolist(), turned
         tilt_now, look_ahead_m = 0.0, 0.0
         while True:
             turn = lip_world.tolist(), pybullet.getQuaternionFromAxisAngle(axis_world.tolist(), tilt_now)
             pose = pybullet.multiplyTransforms(*turn, *from_lip)
-            pybullet.resetBasePositionAndOrientation(held, *pose, physicsClientId=self._client)
+            self._put(held, *pose)
             gap_m = self.gap_m(held, second, look_ahead_m)
             if gap_m < 0.0:
                 return True

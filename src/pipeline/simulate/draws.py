@@ -88,11 +88,6 @@ def stream(seed: int, attempt: int) -> np.random.Generator:
     return np.random.Generator(np.random.Philox(key=np.array([seed, attempt], dtype=np.uint64)))
 
 
-def opening_radius_m(cavity: Cavity) -> float:
-    """Return the mean distance of the rim's points to their mean, the paper's radius (Section II-D)."""
-    return float(np.linalg.norm(cavity.rim_m - cavity.opening_m, axis=1).mean())
-
-
 def draw_pouring(cup: Cavity, protocol: Pouring, rng: np.random.Generator) -> PouringDraw:
     """Draw a pour of a cup alone: fill and tilt uniform, the lip at the rim's lowest point."""
     share = rng.uniform(protocol.fill_min, protocol.fill_max)
@@ -124,18 +119,18 @@ def draw_filling(
     """
     heading, yaw = rng.uniform(-np.pi, np.pi, 2)
     relative = protocol.ranges == "relative"
-    radius_m = opening_radius_m(second) if relative else CUP_RADIUS_M
+    radius_m = second.opening_radius_m if relative else CUP_RADIUS_M
     dx, dy = rng.uniform(-1.0, 1.0, 2) * protocol.offset_max_radii * radius_m
     dz = rng.uniform(protocol.height_min, protocol.height_max) * (held_height_m if relative else CUP_HEIGHT_M)
     half, second_fill_m3 = _second_fill(second, particle_m3, protocol, trial, rng.uniform())
 
-    standoff_m = protocol.offset_max_radii * radius_m + opening_radius_m(held)
+    standoff_m = protocol.offset_max_radii * radius_m + held.opening_radius_m
     R = frames.rotation_about(np.array([0.0, 0.0, 1.0]), yaw)
     approach = np.array([-standoff_m * np.cos(heading), -standoff_m * np.sin(heading), dz])
     T_world_approach = _placed(R, held.opening_m, second.opening_m + approach)
     lip = lip_towards(held, T_world_approach, second.opening_m)
     axis = R @ pour_axis(held.opening_m, lip)
-    along = np.cross(axis, [0.0, 0.0, 1.0])
+    along = np.array([axis[1], -axis[0], 0.0])
     lip_world = second.opening_m + dx * along + dy * axis + dz * np.array([0.0, 0.0, 1.0])
     T_world_held = _placed(R, lip, lip_world)
     return FillingDraw(

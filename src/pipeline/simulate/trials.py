@@ -176,7 +176,7 @@ def filling_margin(
     along = np.cross(draw.axis_world, [0.0, 0.0, 1.0])
     landing = draw.lip_world + throw_m(held.depth_m, draw.dz_m, protocol.tilt_rad) * along
     rim_world = frames.apply(draw.T_world_second, second.cavity.rim_m)
-    inside = inside_m(rim_world[:, :2], landing[:2]) / draws.opening_radius_m(second.cavity)
+    inside = inside_m(rim_world[:, :2], landing[:2]) / second.cavity.opening_radius_m
     margin = min(inside, (capacity_m3 - draw.second_fill_m3 - held_m3) / capacity_m3)
     axis_held = draw.T_world_held[:3, :3].T @ draw.axis_world
     least_m3 = 0.5 * held.particle_m3
