@@ -113,13 +113,15 @@ def _distance(cavity: Cavity) -> np.ndarray:
 
 def _convolved(solid: np.ndarray, support: float, cell: float) -> list[np.ndarray]:
     """Return the integral of the kernel over the solid about each cell, and its gradient."""
-    from scipy.signal import fftconvolve
+    from scipy import fft  # scipy.signal's fftconvolve does the same, and takes 0.3 s to load
 
     reach = int(np.ceil(support / cell))
     offset = cell * np.stack(np.meshgrid(*[np.arange(-reach, reach + 1)] * 3, indexing="ij"))
     q = np.minimum(np.linalg.norm(offset, axis=0) / support, 1.0)
     kernel = np.where(q <= 0.5, 6 * q**3 - 6 * q**2 + 1, 2 * (1 - q) ** 3)
-    share = fftconvolve(solid, kernel / kernel.sum(), mode="same")
+    shape = [fft.next_fast_len(n + 2 * reach, real=True) for n in solid.shape]
+    share = fft.irfftn(fft.rfftn(solid, shape) * fft.rfftn(kernel / kernel.sum(), shape), shape)
+    share = share[tuple(slice(reach, reach + n) for n in solid.shape)]
     return [share, *np.gradient(share, cell)]
 
 
