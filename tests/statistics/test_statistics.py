@@ -47,8 +47,8 @@ def resampled(n_replicates: int = 50) -> tuple[Resampled, dict, list[str]]:
             groups, labels, scores = trials_of(seed=10 * i + draw)
             novel = groups != i
             data[trainer, draw] = groups[novel], labels[novel], scores[novel]
-            objects = np.array(names)[groups[novel]]
-            collected.add(("x", "novel"), trainer, objects, labels[novel], scores[novel])
+            tested = collected.groups(np.array(names)[groups[novel]])
+            collected.add(("x", "novel"), trainer, tested, labels[novel], scores[novel])
     return collected, data, names
 
 

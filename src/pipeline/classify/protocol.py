@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from sklearn import config_context
 
 from pipeline.classify.regression import FPR_GRID, Score, classifier, iterations, score, separable
 from pipeline.classify.trained import trained
@@ -119,6 +120,7 @@ def draw_training_set(
     raise PipelineError(f"{name}: {MAX_REDRAWS} training sets of {samples} trials had one outcome only")
 
 
+@config_context(skip_parameter_validation=True)  # of thousands of small fits
 def evaluate(
     trials: pd.DataFrame,
     labels: np.ndarray,
@@ -134,12 +136,18 @@ def evaluate(
     """
     experiment = str(trials["experiment"].iloc[0])
     sets, total = training_sets(trials, labels, protocol), trials["object"].nunique() * protocol.draws
+    objects = trials["object"].to_numpy()
+    groups = results.resampled.groups(objects)
     for drawn in progress(sets, total, told) if told else sets:
+        tests = list(splits(objects, drawn))
         for features, values in feature_sets.items():
             fitted, training = fit(values[drawn.rows], labels[drawn.rows], protocol, drawn.n_redrawn)
             results.models.append(trained(fitted, experiment, features, drawn, protocol, training))
             probability = fitted.predict_proba(values)[:, 1]
-            _test(results, features, trials, labels, probability, drawn, training)
+            head = {"experiment": experiment, "training_object": drawn.training_objects[0], "draw": drawn.draw}
+            for split, rows in tests:
+                full = {**head, "features": features, "split": split}
+                _test(results, full, rows, labels[rows], probability[rows], groups[rows], training)
 
 
 def fit(
@@ -191,20 +199,18 @@ def _held_cups(
 
 def _test(
     results: Results,
-    features: str,
-    trials: pd.DataFrame,
+    head: dict[str, Any],
+    rows: np.ndarray,
     labels: np.ndarray,
     probability: np.ndarray,
-    drawn: TrainingSet,
+    groups: np.ndarray,
     training: dict[str, Any],
 ) -> None:
-    objects, name = trials["object"].to_numpy(), drawn.training_objects[0]
-    head = {"experiment": trials["experiment"].iloc[0], "training_object": name, "draw": drawn.draw}
-    for split, rows in splits(objects, drawn):
-        full = {**head, "features": features, "split": split}
-        results.add_score(full, score(labels[rows], probability[rows]), labels[rows], training)
-        results.resampled.add((features, split), name, objects[rows], labels[rows], probability[rows])
-        results.add_predictions(full, rows, probability[rows])
+    """Record what one classifier said of some `rows` of the trials, their labels, and their objects by number, all (n,)."""
+    results.add_score(head, score(labels, probability), labels, training)
+    key = head["features"], head["split"]
+    results.resampled.add(key, head["training_object"], groups, labels, probability)
+    results.add_predictions(head, rows, probability)
 
 
 def splits(objects: np.ndarray, drawn: TrainingSet) -> Iterator[tuple[str, np.ndarray]]:
@@ -220,12 +226,12 @@ def ceiling(trials: pd.DataFrame, labels: np.ndarray, results: Results) -> None:
     """Add the hydrostatic answer to the same trials as features `hydrostatic`: nothing is trained, draw 0."""
     training = {"n_iterations": 0, "converged": True, "n_redrawn": 0, "separable": False}
     objects, margins = trials["object"].to_numpy(), trials["hydrostatic_margin"].to_numpy()
-    every = np.ones(len(trials), dtype=bool)
+    every, groups = np.ones(len(trials), dtype=bool), results.resampled.groups(objects)
     for name in map(str, pd.unique(trials["object"])):
         for split, rows in splits(objects, TrainingSet((name,), 0, np.array([], dtype=int), 0, every)):
             head = {"experiment": trials["experiment"].iloc[0], "features": "hydrostatic", "split": split}
             outcome = score(labels[rows], margins[rows], margins=True)
             results.add_score({**head, "training_object": name, "draw": 0}, outcome, labels[rows], training)
             results.resampled.add(
-                ("hydrostatic", split), name, objects[rows], labels[rows], margins[rows], margins=True
+                ("hydrostatic", split), name, groups[rows], labels[rows], margins[rows], margins=True
             )

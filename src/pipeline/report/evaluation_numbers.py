@@ -159,7 +159,7 @@ def halves(
         for (features, trainer, _), rows in predictions[half == name].groupby(
             ["features", "training_object", "draw"], observed=True
         ):
-            tested = rows["test_object"].astype(str).to_numpy()
+            tested = resampled.groups(rows["test_object"].astype(str).to_numpy())
             resampled.add(
                 (features,),
                 str(trainer),

@@ -41,21 +41,24 @@ class Resampled:
     _values: dict[tuple, list[np.ndarray]] = field(default_factory=lambda: defaultdict(list))
     _pairs: dict[tuple, list[np.ndarray]] = field(default_factory=lambda: defaultdict(list))
 
+    def groups(self, objects: np.ndarray) -> np.ndarray:
+        """Return the number (N,) in `names` of each of `objects` (N,)."""
+        return pd.Index(self.names).get_indexer(objects)
+
     def add(
         self,
         key: tuple,
         trainer: str,
-        objects: np.ndarray,
+        groups: np.ndarray,
         labels: np.ndarray,
         scores: np.ndarray,
         *,
         margins: bool = False,
     ) -> None:
-        """Add one classifier's test on trials (N,) of `objects`; `key` says which mean it belongs to.
+        """Add one classifier's test on trials (N,) of objects by their number, `groups`; `key` says which mean it belongs to.
 
         Scores that are `margins` instead of probabilities have no Brier score.
         """
-        groups = pd.Index(self.names).get_indexer(objects)
         own = self.names.index(trainer)
         alone = bool((groups == own).all())
         drawn = np.flatnonzero(self.weights[:, own] > 0)
