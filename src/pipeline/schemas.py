@@ -51,6 +51,7 @@ TABLES = {
         _strings("object", "mapping")
         + _floats(
             *("radius_m", "volume_m3", "height_m", "tilt_reference_rad", "capacity_m3"),
+            *("tilt_reference_cavity_rad", "wall_m"),
             *("opening_x_m", "opening_y_m", "opening_z_m", "lip_x_m", "lip_y_m", "lip_z_m"),
             *("centre_x_m", "centre_y_m", "centre_z_m"),
         )

@@ -24,7 +24,7 @@ def inputs(tmp_path_factory):
     folder = tmp_path_factory.mktemp("inputs")
     pours.write(folder / "shown", [pours.pour(seed, length_s=4.0 + 0.1 * seed) for seed in range(10)])
     zero = {f"{what}_{axis}_m": 0.0 for what in ("opening", "lip", "centre") for axis in "xyz"}
-    own = {"volume_m3": 1e-3, "capacity_m3": 1e-3, **zero}
+    own = {"volume_m3": 1e-3, "capacity_m3": 1e-3, "tilt_reference_cavity_rad": 1.0, "wall_m": 0.003, **zero}
     cup = {"height_m": HEIGHT_M, "tilt_reference_rad": TILT_RAD, "radius_m": 0.04}
     bowl = {"height_m": 0.06, "tilt_reference_rad": 0.3, "radius_m": RADIUS_M}
     rows = [

@@ -74,6 +74,7 @@ def test_a_failed_trial_is_neither_trained_nor_tested_on(violent, tmp_path, monk
     rows = artefacts.read_table(violent, "trials")
     point = {f"{what}_{axis}_m": 0.03 for what in ("opening", "lip", "centre") for axis in "xyz"}
     values = {"radius_m": 0.03, "volume_m3": 2e-4, "height_m": 0.06, "tilt_reference_rad": 0.8}
+    values |= {"tilt_reference_cavity_rad": 0.8, "wall_m": 0.003}
     parameters = [
         {"object": "cup", "mapping": mapping, "capacity_m3": 2e-4, **values, **point}
         for mapping in ("point_mapping", "label_mapping")

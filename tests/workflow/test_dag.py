@@ -26,7 +26,7 @@ SIMULATED = each("simulate_pouring") | each("simulate_filling") | LEARNT
 CONTAINED = each("simulate_container") | SIMULATED | {"draw_parameters"}
 COMPARED = each("accuracy")
 PARAMETRISED = each("parametrise") | ASSEMBLED | COMPARED | LEARNT
-UNCERTAIN = each("uncertainties") | ESTIMATED | COMPARED | {"report", "index"}
+UNCERTAIN = each("uncertainties") | ESTIMATED | {"index"}
 WARPED = each("warp") | PARAMETRISED | UNCERTAIN | {"draw_labels"}
 
 

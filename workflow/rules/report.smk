@@ -21,11 +21,7 @@ rule accuracy:
         fuse=rules.fuse.output,
         label=rules.label.output.labels,
         warp=expand(rules.warp.output, source=SOURCE, allow_missing=True),
-        parametrise=expand(
-            [rules.parametrise.output.parameters, rules.uncertainties.output[0]],
-            source=SOURCE,
-            allow_missing=True,
-        ),
+        parametrise=expand(rules.parametrise.output.parameters, source=SOURCE, allow_missing=True),
     output:
         errors=f"{PROCESSED}/report/accuracy/{{object}}.json",
     log:

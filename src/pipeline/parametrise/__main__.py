@@ -8,10 +8,10 @@ from pipeline.artefacts import points, read_columns, write_table
 from pipeline.columns import Columns
 from pipeline.errors import PipelineError
 
-# The paper's, and the capacity: what later stages use.
-PAPER = (
+# The paper's, and what later stages use or compare beside them.
+WRITTEN = (
     *("opening_m", "lip_m", "radius_m", "volume_m3", "height_m", "tilt_reference_rad"),
-    "capacity_m3",
+    *("capacity_m3", "tilt_reference_cavity_rad", "wall_m"),
 )
 ALONG_RIM = ("x_m", "y_m", "z_m", "tilt_reference_rad")
 
@@ -62,9 +62,9 @@ def _read_off(table: Columns, name: str, hull_points: int) -> tuple[dict[str, fl
     from pipeline.parametrise.parameters import evaluate, numbers
 
     pieces = cloud.warped(table, name=name).pieces(hull_points)
-    values = evaluate([*PAPER, "tilt_references_rad"], pieces)
+    values = evaluate([*WRITTEN, "tilt_references_rad"], pieces)
     columns = dict(zip(ALONG_RIM, (*values["rim_m"].T, values["tilt_references_rad"]), strict=True))
-    return numbers(PAPER, values), columns
+    return numbers(WRITTEN, values), columns
 
 
 def _nothing() -> tuple[dict[str, float], dict[str, Any]]:
@@ -72,7 +72,7 @@ def _nothing() -> tuple[dict[str, float], dict[str, Any]]:
 
     from pipeline.parametrise.parameters import known
 
-    columns = [column for found in known(PAPER) for column in found.columns]
+    columns = [column for found in known(WRITTEN) for column in found.columns]
     return dict.fromkeys(columns, np.nan), dict.fromkeys(ALONG_RIM, np.zeros(0))
 
 

@@ -82,10 +82,8 @@ def errors(
     tell("parameters")
     folder = processed / "parametrise" / source
     parameters = read_table(folder / f"{name}.parquet", "parameters").set_index("mapping")
-    listed = read_table(folder / "uncertainties" / f"{name}.parquet", "uncertainties")
     for mapping, row in parameters.iterrows():
-        more = listed[listed["mapping"] == mapping].set_index("parameter")["value"]
-        compared = parameter_errors(row, more, truth)
+        compared = parameter_errors(row, truth)
         found |= {f"parametrise.{mapping}.{key}": value for key, value in compared.items()}
     tell("labels")
     return found | (label_errors(processed, source, name, truth) if name != source else {})
@@ -215,17 +213,14 @@ def _balanced_accuracy(found: np.ndarray, true: np.ndarray) -> float:
     return float((found[true].mean() + (~found[~true]).mean()) / 2.0)
 
 
-def parameter_errors(row: pd.Series, more: pd.Series, truth: Truth) -> dict[str, float]:
+def parameter_errors(row: pd.Series, truth: Truth) -> dict[str, float]:
     """Return relative errors of the scalars, the opening's error (mm) and those of the tilt references (degrees).
 
-    `row` is of table `parameters`, `more` has the listed numbers by name. The tilt reference's truth is the same functional
+    `row` is of table `parameters`. The tilt reference's truth is the same functional
     of the true hull, at the true rim point nearest to the warped lip; that on the cavity is what hydrostatics says there.
     """
     true_value = {**truth.facts, "volume_m3": truth.facts["hull_volume_m3"]}
-    known = {**more, **row}
-    errors = {
-        name: float(known[key] / true_value[key] - 1.0) for name, key in SCALARS.items() if key in known
-    }
+    errors = {name: float(row[key] / true_value[key] - 1.0) for name, key in SCALARS.items()}
     rim_m = points(truth.cloud[truth.cloud["rim"]])
     opening_m = rim_m.mean(axis=0)
     found_m, lip_m = (
@@ -236,9 +231,8 @@ def parameter_errors(row: pd.Series, more: pd.Series, truth: Truth) -> dict[str,
     true_lip_m = rim_m[np.argmin(np.linalg.norm(rim_m - lip_m, axis=1))]
     true_tilt_rad = hulls.tilt_reference_rad(truth.inside_m, true_lip_m, opening_m)
     errors["tilt_reference_deg"] = float(np.degrees(row["tilt_reference_rad"] - true_tilt_rad))
-    if "tilt_reference_cavity_rad" in more:
-        half_rad = half_emptied_rad(truth.cavity, lip_m)
-        errors["tilt_reference_cavity_deg"] = float(np.degrees(more["tilt_reference_cavity_rad"] - half_rad))
+    half_rad = half_emptied_rad(truth.cavity, lip_m)
+    errors["tilt_reference_cavity_deg"] = float(np.degrees(row["tilt_reference_cavity_rad"] - half_rad))
     return errors
 
 

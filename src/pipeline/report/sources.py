@@ -58,7 +58,6 @@ def main() -> None:
 def matrices(processed: Path, names: list[str]) -> "dict[str, np.ndarray]":
     """Return error → (sources, targets), absolute, by label mapping."""
     import numpy as np
-    import pandas as pd
 
     from pipeline.report.accuracy import label_scores, parameter_errors, read_truth, true_parts
 
@@ -69,7 +68,7 @@ def matrices(processed: Path, names: list[str]) -> "dict[str, np.ndarray]":
         for row, source in enumerate(names):
             table = read_table(processed / "parametrise" / source / f"{target}.parquet", "parameters")
             values = table.set_index("mapping").loc["label_mapping"]
-            errors = parameter_errors(values, pd.Series(dtype=float), truth)
+            errors = parameter_errors(values, truth)
             mapped = read_table(processed / "warp" / source / target / "label_mapping.parquet", "mapping")
             errors["rim_missed"] = 1.0 - label_scores(mapped, parts)["rim.iou"]
             for key, matrix in found.items():

@@ -45,8 +45,6 @@ def scores(processed: Path, source: str, target: str, by: str, truth: "Truth") -
     """Return what a warp says of itself, and its labels and parameters against the truth, absolute; nan where there is none."""
     import math
 
-    import pandas as pd
-
     from pipeline.report.accuracy import label_scores, parameter_errors, true_parts
 
     warp = processed / "warp" / source / "by" / by / target
@@ -57,7 +55,7 @@ def scores(processed: Path, source: str, target: str, by: str, truth: "Truth") -
     row = table.set_index("mapping").loc["label_mapping"]
     errors = {}
     if not row.isna().any():
-        errors = parameter_errors(row, pd.Series(dtype=float), truth)
+        errors = parameter_errors(row, truth)
     own = alignment["label_mapping"]
     return {
         "residual_mm": 1e3 * own["residual_m"],
