@@ -144,9 +144,9 @@ def evaluate(
             fitted, training = fit(values[drawn.rows], labels[drawn.rows], protocol, drawn.n_redrawn)
             results.models.append(trained(fitted, experiment, features, drawn, protocol, training))
             probability = fitted.predict_proba(values)[:, 1]
-            head = {"experiment": experiment, "training_object": drawn.training_objects[0], "draw": drawn.draw}
+            head = {"experiment": experiment, "features": features, "draw": drawn.draw}
             for split, rows in tests:
-                full = {**head, "features": features, "split": split}
+                full = {**head, "training_object": drawn.training_objects[0], "split": split}
                 _test(results, full, rows, labels[rows], probability[rows], groups[rows], training)
 
 

@@ -73,7 +73,8 @@ class Containers:
 
     def move(self, body: int, T_world_body: np.ndarray) -> None:
         """Put a body at a pose (4, 4), unless it is there."""
-        if not np.array_equal(self._pose.get(body), T_world_body):
+        before = self._pose.get(body)
+        if before is None or not np.array_equal(before, T_world_body):
             bodies.place(body, T_world_body, self._client)
             self._pose[body] = T_world_body.copy()
 

@@ -14,10 +14,11 @@ class Particles(NamedTuple):
 
     x, v (N, 4) in m and m/s; impulse (N,), the pressure's. gone_*: those that left in the last step, the first `count[1]`,
     `gone_how` as in `kernels`. spare_*: room for sorting; bin_of (N,), bin_start (cells + 2,): the sorting. rows (5, 2): where a
-    cell's partners are. first (N + 1,), other (pairs,): the pairs of particle i are first[i] to first[i + 1]; their weight (pairs,), the kernel, and slope (pairs, 4),
-    its gradient: the way apart times the factor (pairs,), which holds the square of the distance before. sums (N, 8): the
-    density's gradient (3), density, the change of velocity (3). wall (N, 4): the part of gradient and density that no other
-    particle makes. change (N,): of the impulse. Rows have four numbers, 0 the last of a vector's: so they run in vectors.
+    cell's partners are. first (N + 1,), other (pairs,): the pairs of particle i are first[i] to first[i + 1]; their weight
+    (pairs,), the kernel, and slope (pairs, 4), its gradient: the way apart times the factor (pairs,), which holds the square of
+    the distance before. sums (N, 8): the density's gradient (3), density, the change of velocity (3). wall (N, 4): the part of
+    gradient and density that no other particle makes. change (N,): of the impulse. Rows of x, v, sums, wall and slope have four
+    numbers or eight, 0 the last of a vector's: so they run in vectors.
     """
 
     x: np.ndarray
