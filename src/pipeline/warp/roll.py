@@ -70,17 +70,22 @@ def _handles(cloud: Cloud, origin_m: np.ndarray, ring_m: np.ndarray) -> list[np.
     if not cloud.parts[:, 2].any():
         return []
     off, outward = standing_off(cloud, origin_m)
-    rim_low_m = np.quantile(ring_m[:, 2], 0.02)
+    low_m = rim_low_m(ring_m)
     found = []
     for rows in components(cloud, off):
         alike = rows[cloud.parts[rows, 2]]
         if len(rows) < HANDLE_MIN_SHARE * len(off) or len(alike) < LOOKS * len(rows):
             continue
         loops = np.mean(_outside_wall(cloud, rows, origin_m, outward)) > FACES_BODY
-        below = np.mean(cloud.points_m[rows, 2] >= rim_low_m) < FACES_BODY
+        below = np.mean(cloud.points_m[rows, 2] >= low_m) < FACES_BODY
         if loops or below:
             found.append(alike)
     return sorted(found, key=len, reverse=True)
+
+
+def rim_low_m(ring_m: np.ndarray) -> float:
+    """Return how high a rim's ring (M, 3) begins, but for one point in fifty."""
+    return float(np.quantile(ring_m[:, 2], 0.02))
 
 
 def standing_off(cloud: Cloud, origin_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
