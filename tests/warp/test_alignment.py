@@ -116,6 +116,34 @@ def test_a_handle_tells_the_roll(name):
     assert angle_between(second_azimuth(body), handle_azimuth(body)) < np.radians(2.0)
 
 
+def in_two_and_more(body: Cloud, handle: np.ndarray, radial: np.ndarray) -> np.ndarray:
+    """Return which points are taken for handle: both ends of it, and a band of the wall that is as large."""
+    height = body.points_m[:, 2]
+    low, high = np.quantile(height[handle], [0.3, 0.7])
+    ends = handle & ((height < low) | (height > high))
+    return ends | (~handle & (radial > 0.0) & (height < np.quantile(height[radial > 0.0], 0.2)))
+
+
+def half_of_the_body(body: Cloud, handle: np.ndarray, radial: np.ndarray) -> np.ndarray:
+    """Return which points are taken for handle: it, and half of the outer wall, joined to it."""
+    return handle | ((radial > 0.0) & (body.points_m[:, 2] < 0.7 * body.points_m[:, 2].max()))
+
+
+@pytest.mark.parametrize("taken", [in_two_and_more, half_of_the_body])
+@pytest.mark.parametrize("name", ["mug", "espresso_cup", "jug"])
+def test_a_handle_tells_the_roll_where_its_labels_have_gaps_or_run_over_the_wall(name, taken):
+    body = cloud(name)
+    handle = body.parts[:, 2]
+    middle_m = body.points_m[body.parts[:, 0]].mean(axis=0)
+    radial = np.einsum("nc,nc->n", (body.points_m - middle_m)[:, :2], body.normals[:, :2])
+    parts = body.parts.copy()
+    parts[:, 2] = taken(body, handle, radial)
+    assert (parts[:, 2] & ~handle).sum() > 0.5 * handle.sum()
+    frame = part_frame(replace(body, parts=parts))
+    assert frame.handles == 1
+    assert angle_between(azimuth(frame.T_object_part[:3, 1]), handle_azimuth(body)) < np.radians(6.0)
+
+
 def test_of_two_handles_one_is_taken_and_both_are_counted():
     mug = cloud("mug")
     other = moved(mug, np.pi / 2, 1.0, (0.0, 0.0, 0.0))

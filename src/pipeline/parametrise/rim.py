@@ -5,44 +5,44 @@ import numpy as np
 from pipeline.geometry.cavity import lowest_point, spout_depth
 from pipeline.parametrise.library import ingredient, parameter
 
-SECTORS = 90
+STEPS = 180
+_BESIDE_RAD = np.radians(4.0)  # points that are as near in azimuth are at the same place of the rim
 _CENTRINGS = 3
 
 
 @ingredient
 def rim_turn(rim_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The rim by length: the sector (N,) of each of its points, and the share of its length (N,) that each stands for.
+    """The rim by length: which points are at each of 180 steps round it (180, N), the share of its length each stands for (N,).
 
-    Labels are deeper here and thinner there, scans denser; the length is the same whatever the points. Hence 90 sectors of
-    azimuth about the centre, each as long as the smoothed contour is in it, divided among its points.
+    Labels are deeper here and thinner there, scans denser; the length is the same whatever the points. Hence even steps of
+    azimuth about the centre, each as long as the contour is there, divided among the points within 4°, in a gap the nearest.
+    They begin at the first point, so that all that is read off them turns with the object.
     """
+    steps = np.arange(STEPS) * 2 * np.pi / STEPS
     centre = rim_m.mean(axis=0)
-    sector, weight = np.zeros(len(rim_m), int), np.zeros(len(rim_m))
     for _ in range(_CENTRINGS):
         azimuth = np.arctan2(*(rim_m - centre)[:, 1::-1].T)
-        turn = np.floor((azimuth + np.pi) / (2 * np.pi) * SECTORS).astype(int) % SECTORS
-        _, sector, count = np.unique(turn, return_inverse=True, return_counts=True)
-        contour = _smooth(np.column_stack([np.bincount(sector, along) / count for along in rim_m.T]))
-        step = np.linalg.norm(np.roll(contour, -1, axis=0) - contour, axis=1)
-        weight = ((step + np.roll(step, 1)) / count)[sector]
-        weight = weight / weight.sum()
+        apart = np.abs((azimuth - azimuth[0] - steps[:, None] + np.pi) % (2 * np.pi) - np.pi)
+        near = apart <= np.maximum(_BESIDE_RAD, apart.min(axis=1, keepdims=True))
+        share = near / near.sum(axis=1, keepdims=True)
+        contour = _smooth(share @ rim_m)
+        length = np.linalg.norm(np.roll(contour, -1, axis=0) - np.roll(contour, 1, axis=0), axis=1)
+        weight = length @ share / length.sum()
         centre = weight @ rim_m
-    return sector, weight
+    return near, weight
 
 
 @ingredient
 def contour_m(rim_m: np.ndarray, rim_turn: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """Smoothed contour of the rim (M, 3), M <= 90, by azimuth: the mean of each sector, at its top's height."""
-    sector, _ = rim_turn
-    top = np.full(sector.max() + 1, -np.inf)
-    np.maximum.at(top, sector, rim_m[:, 2])
-    across = [np.bincount(sector, along) / np.bincount(sector) for along in rim_m.T[:2]]
-    return _smooth(np.column_stack([*across, top]))
+    """Smoothed contour of the rim (180, 3), in even steps of azimuth: the mean of each step's points, at their top's height."""
+    near, _ = rim_turn
+    across = near @ rim_m[:, :2] / near.sum(axis=1, keepdims=True)
+    return _smooth(np.column_stack([across, np.where(near, rim_m[:, 2], -np.inf).max(axis=1)]))
 
 
 def _smooth(contour: np.ndarray) -> np.ndarray:
-    """Return the circular mean over five neighbours: single noisy points make no lip."""
-    return np.mean([np.roll(contour, shift, axis=0) for shift in range(-2, 3)], axis=0)
+    """Return the circular mean over nine neighbours, 18°: single noisy points make no lip."""
+    return np.mean([np.roll(contour, shift, axis=0) for shift in range(-4, 5)], axis=0)
 
 
 @parameter("m", parts="xyz")

@@ -107,8 +107,7 @@ def draw(errors: "dict[str, np.ndarray]", names: list[str], source: str, adopted
         figure.suptitle(
             f"Every object as the source for every other, label mapping. A human annotated the {source.replace('_', ' ')}; "
             f"others ({words or 'none'})\nare annotated by the labels that it gave them, so that its errors are in theirs. "
-            "Initial labels are learnt from each source alone.\nA source that has a handle and does not recognise a target's takes "
-            "that for container: the hull is then too large. Framed: the source itself.",
+            "Initial labels are learnt from each source alone. Framed: the source itself.",
             fontsize=8,
         )
     return figure

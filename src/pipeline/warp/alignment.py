@@ -44,7 +44,7 @@ def part_frame(cloud: Cloud) -> PartFrame:
             f"{cloud.name}: expected a container, but only {len(container_m)} of its points look like one; look at the scan"
         )
     origin_m = container_m.mean(axis=0)
-    ring_m = _rim_ring(cloud)
+    ring_m = rim_ring(cloud)
     first = _first_axis(ring_m.mean(axis=0) - origin_m, name=cloud.name)
     turned = roll(cloud, origin_m, ring_m)
     second = turned.axis - first * (turned.axis @ first)
@@ -72,7 +72,7 @@ def _first_axis(to_rim: np.ndarray, *, name: str) -> np.ndarray:
     return np.array([0.0, 0.0, 1.0])
 
 
-def _rim_ring(cloud: Cloud) -> np.ndarray:
+def rim_ring(cloud: Cloud) -> np.ndarray:
     """Return the points (M, 3) of the candidate ring that goes round most of an opening that is open.
 
     Edges of a base look like rims to local features; but across a base there is a surface.

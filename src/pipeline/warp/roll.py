@@ -9,8 +9,8 @@ from pipeline.warp.clouds import Cloud
 from pipeline.warp.components import components
 
 HANDLE_MIN_SHARE = 0.02
-# Shares of a handle's points that stand off the body, and that face it from outside; the latter, of the body's radius.
-STANDS_OFF, FACES_BODY, GAP = 0.3, 0.05, 0.05
+# Shares of a handle's points that are labelled so, and that face the body from outside; how far off it, of the body's radius.
+LOOKS, FACES_BODY, GAP = 0.3, 0.05, 0.05
 WAY = np.linspace(0.15, 0.9, 26)  # shares of the way from a handle to the axis; its own wall comes before
 ALIKE = 0.8  # a second handle counts as large as the first from here on
 SECTORS, ROUND_SHARE, REPEATS = 72, 0.015, 0.9
@@ -64,21 +64,28 @@ def _horizontal(vector: np.ndarray) -> np.ndarray:
 def _handles(cloud: Cloud, origin_m: np.ndarray, ring_m: np.ndarray) -> list[np.ndarray]:
     """Return the rows of each handle, that with most points first.
 
-    A candidate must stand off the body. A spout does, too: it reaches the rim, and nothing of it faces the body from outside.
+    A candidate stands off the body, and looks like a handle in part. A spout may, too: it reaches the rim, and nothing of it
+    faces the body from outside.
     """
-    pieces = components(cloud, cloud.parts[:, 2])
-    pieces = [rows for rows in pieces if len(rows) >= HANDLE_MIN_SHARE * len(cloud.points_m)]
-    if not pieces:
+    if not cloud.parts[:, 2].any():
         return []
     off, outward = standing_off(cloud, origin_m)
-    rim_low_m = np.quantile(ring_m[:, 2], 0.02)
+    low_m = rim_low_m(ring_m)
     found = []
-    for rows in pieces:
-        loops = np.mean(off[rows] & _outside_wall(cloud, rows, origin_m, outward)) > FACES_BODY
-        below = np.mean(cloud.points_m[rows, 2] >= rim_low_m) < FACES_BODY
-        if np.mean(off[rows]) > STANDS_OFF and (loops or below):
-            found.append(rows[off[rows]])
+    for rows in components(cloud, off):
+        alike = rows[cloud.parts[rows, 2]]
+        if len(rows) < HANDLE_MIN_SHARE * len(off) or len(alike) < LOOKS * len(rows):
+            continue
+        loops = np.mean(_outside_wall(cloud, rows, origin_m, outward)) > FACES_BODY
+        below = np.mean(cloud.points_m[rows, 2] >= low_m) < FACES_BODY
+        if loops or below:
+            found.append(alike)
     return sorted(found, key=len, reverse=True)
+
+
+def rim_low_m(ring_m: np.ndarray) -> float:
+    """Return how high a rim's ring (M, 3) begins, but for one point in fifty."""
+    return float(np.quantile(ring_m[:, 2], 0.02))
 
 
 def standing_off(cloud: Cloud, origin_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -6,11 +6,11 @@ from functools import cached_property
 import numpy as np
 
 from pipeline.geometry import frames
-from pipeline.warp.alignment import PartFrame
+from pipeline.warp.alignment import PartFrame, rim_ring
 from pipeline.warp.clouds import Cloud, Mapped, subset
 from pipeline.warp.deformation import Deformation
 from pipeline.warp.nearest import agreeing_neighbours, majority_of_neighbours, mean_of_neighbours
-from pipeline.warp.roll import standing_off
+from pipeline.warp.roll import rim_low_m, standing_off
 
 FAR = 0.1  # further than this, in spreads of the container, a pair is no pair
 
@@ -56,15 +56,16 @@ class Warp:
     def is_known(self) -> np.ndarray:
         """Which of the target's points (M,) the source can have, too.
 
-        All, where it has a handle itself; else not what stands off the target's body, is no rim by its initial labels, and is far
-        from all points of the source with an agreeing normal.
+        All, where it has a handle itself; else not what stands off the target's body, is no part of its rim, and is far from all
+        points of the source with an agreeing normal. (Below the rim's ring a rim by the initial labels is none: handles look so.)
         """
         if self.source.parts[:, 2].any():
             return np.ones(len(self.target.points_m), dtype=bool)
         off, _ = standing_off(self.target, self.target_frame.T_object_part[:3, 3])
         spread_m = np.linalg.norm(self.target_frame.spread_m)
         far = label_pairs(self, 1)[1][:, 0] > FAR * spread_m
-        return ~(off & far & ~self.target.parts[:, 1])
+        rim = self.target.parts[:, 1] & (self.target.points_m[:, 2] >= rim_low_m(rim_ring(self.target)))
+        return ~(off & far & ~rim)
 
     @property
     def source_index(self) -> np.ndarray:
