@@ -48,9 +48,8 @@ def _of_corners(triangles, values):  # type: ignore[no-untyped-def]
     return total
 
 
-def sharpened(normals: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return unit normals (V, 3) of a closed mesh averaged with those neighbours' that are much alike."""
-    near = neighbours(triangles, len(normals))
+def sharpened(normals: np.ndarray, near: csr_matrix) -> np.ndarray:
+    """Return unit normals (V, 3) averaged with those neighbours' that are much alike; near (V, V): 1 at each vertex's neighbours."""
     for _ in range(SHARPENINGS):
         normals = _alike(near.indptr, near.indices, normals, ALIKE)
     return normals
