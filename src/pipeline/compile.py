@@ -65,19 +65,21 @@ STAGES: dict[str, Callable[[], list[str]]] = {"fuse": fuse, "simulate": simulate
 
 def fuse_types() -> dict[Any, str]:
     """Return the functions that fusion calls and the types that it calls them with, as numba writes them."""
-    from pipeline.fuse import measuring, planes, smoothing
+    from pipeline.fuse import corners, measuring, planes, smoothing
     from pipeline.geometry import sampling
 
     points, rows, views = "f8[:,::1]", "i8[:,::1]", "f4[:,::1], i8[:,::1], f8[:,:,::1]"
     return {
-        planes._fitted: f"(f4[:,::1], {points}, {points}, {points})",
+        planes.inverse_depths: "(Array(float32, 2, 'A', False, aligned=True),)",
+        planes._fitted: f"({points}, {points}, {points}, {points})",
         measuring.signed_distances: f"(i8[::1], f8, b1[:,::1], b1[::1], b1[:,:,::1], {views}, f8)",
         measuring.offsets: f"({points}, {points}, {views}, f8)",
         measuring.outlines: f"({points}, {points}, b1[::1], {views}, {points})",
-        smoothing._around: f"({rows}, {points}, i8)",
-        smoothing._of_corners: f"({rows}, {points})",
+        smoothing._areas_around: f"({points}, {rows})",
+        smoothing._around: f"({rows}, {points})",
         smoothing._alike: f"(i4[::1], i4[::1], {points}, f8)",
         smoothing.smoothed: f"({points}, i4[::1], i4[::1], {points}, i8, UniTuple(f8, 2))",
+        corners._faced: f"({points}, {rows}, {points}, {points}, {points}, f8[::1], i4[::1], i4[::1])",
         sampling._eliminate: "(i8[::1], i8[::1], f8[::1], i8)",
     }
 

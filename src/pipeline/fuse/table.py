@@ -63,7 +63,8 @@ class Points:
 
     def only(self, kept: np.ndarray) -> "Points":
         """Return the points (N,) that are kept."""
-        return Points(self.places_m[kept], self.view[kept])
+        index = np.flatnonzero(kept)  # rows are taken faster by number than by mask
+        return Points(self.places_m.take(index, axis=0), self.view.take(index))
 
 
 def world_points(views: Views, stride: int = _STRIDE) -> Points:
