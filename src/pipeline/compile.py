@@ -80,6 +80,7 @@ def fuse_types() -> dict[Any, str]:
         smoothing._alike: f"(i4[::1], i4[::1], {points}, f8)",
         smoothing.smoothed: f"({points}, i4[::1], i4[::1], {points}, i8, UniTuple(f8, 2))",
         corners._faced: f"({points}, {rows}, {points}, {points}, {points}, f8[::1], i4[::1], i4[::1])",
+        sampling._weights: f"({points}, {points}, {rows}, f8)",
         sampling._eliminate: "(i8[::1], i8[::1], f8[::1], i8)",
     }
 

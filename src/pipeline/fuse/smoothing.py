@@ -86,9 +86,9 @@ def smoothed(vertices, start, neighbour, move, rounds, factors):  # type: ignore
             for j in range(start[i], start[i + 1]):
                 near = neighbour[j]
                 x, y, z = x + now[near, 0], y + now[near, 1], z + now[near, 2]
-            count = start[i + 1] - start[i]
-            after[i, 0] = now[i, 0] + factor * (x / count - now[i, 0]) * move[i, 0]
-            after[i, 1] = now[i, 1] + factor * (y / count - now[i, 1]) * move[i, 1]
-            after[i, 2] = now[i, 2] + factor * (z / count - now[i, 2]) * move[i, 2]
+            share = 1.0 / (start[i + 1] - start[i])
+            after[i, 0] = now[i, 0] + factor * (x * share - now[i, 0]) * move[i, 0]
+            after[i, 1] = now[i, 1] + factor * (y * share - now[i, 1]) * move[i, 1]
+            after[i, 2] = now[i, 2] + factor * (z * share - now[i, 2]) * move[i, 2]
         now, after = after, now
     return now

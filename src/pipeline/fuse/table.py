@@ -71,7 +71,7 @@ def world_points(views: Views, stride: int = _STRIDE) -> Points:
     """Return every third pixel of every third row of every view."""
     clouds = []
     for depth, K, T_world_camera in zip(views.depths_m, views.intrinsics, views.T_world_cameras, strict=True):
-        v, u = np.nonzero(depth[::stride, ::stride])
+        v, u = np.nonzero(depth[::stride, ::stride] > 0)
         points = unprojected(stride * u, stride * v, depth[::stride, ::stride][v, u], K)
         clouds.append(frames.apply(T_world_camera, points))
     counts = [len(cloud) for cloud in clouds]

@@ -48,15 +48,27 @@ def even_points(
     area, normals = triangle_areas_and_normals(vertices_m, triangles)
     radius = np.sqrt(area.sum() / (2 * np.sqrt(3) * n))
     pairs = cKDTree(points).query_pairs(2 * radius, output_type="ndarray")
-    normals = normals[triangle]
-    pairs = pairs[np.einsum("ij,ij->i", normals[pairs[:, 0]], normals[pairs[:, 1]]) > 0]
-    distance = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
-    weight = (1 - np.minimum(distance / (2 * radius), 1)) ** _EXPONENT
+    weight = _weights(points, normals[triangle], pairs, 2 * radius)
     one_way = coo_matrix((weight, pairs.T), shape=(len(points), len(points))).tocsr()
     both = (one_way + one_way.T).tocsr()
     both.sort_indices()
     kept = _eliminate(both.indptr.astype(np.int64), both.indices.astype(np.int64), both.data, n)
     return points[kept], triangle[kept]
+
+
+@numba.njit(cache=True)
+def _weights(points, normals, pairs, reach):  # type: ignore[no-untyped-def]
+    """Return how much the points of each pair (P, 2) crowd each other: the nearer the more, not at all on opposite sides."""
+    weights = np.zeros(len(pairs))
+    for p in range(len(pairs)):
+        i, j = pairs[p]
+        cosine, square = 0.0, 0.0
+        for k in range(3):
+            cosine += normals[i, k] * normals[j, k]
+            square += (points[i, k] - points[j, k]) ** 2
+        if cosine > 0:
+            weights[p] = (1 - min(np.sqrt(square) / reach, 1)) ** _EXPONENT
+    return weights
 
 
 @numba.njit(cache=True)
