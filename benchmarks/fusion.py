@@ -79,9 +79,7 @@ def plain(views: Views, placement: Placement, voxel_m: float, truncation_m: floa
         target[index] = grid.attribute(name).reshape((-1,)).numpy()[flat]
     value = tsdf.regularised(value, weight)
     value[~covered] = 1.0
-    vertices, triangles = tsdf.largest_component(
-        *tsdf.canonical(*tsdf._marched(value, lowest, voxel_m, "plain"))
-    )
+    vertices, triangles = tsdf._marched(value * truncation_m, lowest, voxel_m, "plain")
     base = vertices[:, 2] < tsdf._table_layers(voxel_m) * voxel_m
     vertices[base, 2] = 0.0
     return tsdf.Surface(vertices, triangles, ~base, ~base)

@@ -4,6 +4,8 @@ import numba
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
+from pipeline.geometry.sampling import crossed
+
 # Rounds of, and width of, the bilateral filter of normals (Zheng et al. 2011): a corner's two sides do not mix.
 SHARPENINGS, ALIKE = 5, 0.1
 
@@ -17,36 +19,31 @@ def neighbours(triangles: np.ndarray, n: int) -> csr_matrix:
 
 def vertex_normals(vertices_m: np.ndarray, triangles: np.ndarray, smooth: int) -> np.ndarray:
     """Return unit normals (V, 3): of the triangles around each vertex by area, then averaged `smooth` times."""
-    vectors = _areas_around(vertices_m, triangles)
+    vectors = _around(triangles, crossed(vertices_m, triangles), len(vertices_m))
     for _ in range(smooth):
-        vectors = _around(triangles, vectors)
+        vectors = _around(triangles, _of_corners(triangles, vectors), len(vertices_m))
     return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300)
 
 
 @numba.njit(cache=True)
-def _areas_around(vertices, triangles):  # type: ignore[no-untyped-def]
-    """Return the sums (V, 3) over the triangles around each vertex of twice their areas, as vectors along their normals."""
-    total = np.zeros_like(vertices)
+def _around(triangles, values, n):  # type: ignore[no-untyped-def]
+    """Return the sums (n, 3) over the triangles around each vertex of their values (F, 3)."""
+    total = np.zeros((n, 3))
     for f in range(len(triangles)):
-        a, b, c = vertices[triangles[f, 0]], vertices[triangles[f, 1]], vertices[triangles[f, 2]]
-        for k in range(3):
-            i, j = (k + 1) % 3, (k + 2) % 3
-            area = (b[i] - a[i]) * (c[j] - a[j]) - (b[j] - a[j]) * (c[i] - a[i])
-            for corner in range(3):
-                total[triangles[f, corner], k] += area
+        for corner in range(3):
+            for k in range(3):
+                total[triangles[f, corner], k] += values[f, k]
     return total
 
 
 @numba.njit(cache=True)
-def _around(triangles, values):  # type: ignore[no-untyped-def]
-    """Return the sums (V, 3) over the corners of the triangles around each vertex of their values (V, 3)."""
-    total = np.zeros_like(values)
+def _of_corners(triangles, values):  # type: ignore[no-untyped-def]
+    """Return the sums (F, 3) over the corners of each triangle of the vertices' values (V, 3)."""
+    total = np.zeros((len(triangles), 3))
     for f in range(len(triangles)):
-        a, b, c = triangles[f]
-        for k in range(3):
-            value = values[a, k] + values[b, k] + values[c, k]
-            for corner in range(3):
-                total[triangles[f, corner], k] += value
+        for corner in range(3):
+            for k in range(3):
+                total[f, k] += values[triangles[f, corner], k]
     return total
 
 
