@@ -67,6 +67,11 @@ class Points:
         return Points(self.places_m.take(index, axis=0), self.view.take(index))
 
 
+def thinned(values: np.ndarray, most: int) -> np.ndarray:
+    """Return every k-th of the rows: as many as possible, `most` at most."""
+    return values[:: -(-len(values) // most) or 1]
+
+
 def world_points(views: Views, stride: int = _STRIDE) -> Points:
     """Return every third pixel of every third row of every view."""
     clouds = []
@@ -145,7 +150,7 @@ def _ransac(points: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, f
 
 def refined(points: np.ndarray, normal: np.ndarray, offset: float, eyes: np.ndarray) -> Plane:
     """Return the least-squares plane of the points (N, 3) near a first one, upwards to the cameras (M, 3)."""
-    points = points[:: -(-len(points) // _REFINED) or 1]
+    points = thinned(points, _REFINED)
     for _ in range(4):
         inliers = points[np.abs(points @ normal + offset) < INLIER_M]
         if len(inliers) < 3:
