@@ -65,7 +65,7 @@ STAGES: dict[str, Callable[[], list[str]]] = {"fuse": fuse, "simulate": simulate
 
 def fuse_types() -> dict[Any, str]:
     """Return the functions that fusion calls and the types that it calls them with, as numba writes them."""
-    from pipeline.fuse import corners, measuring, planes, smoothing
+    from pipeline.fuse import bends, measuring, planes, smoothing
     from pipeline.geometry import sampling
 
     points, rows, views = "f8[:,::1]", "i8[:,::1]", "f4[:,::1], i8[:,::1], f8[:,:,::1]"
@@ -79,7 +79,7 @@ def fuse_types() -> dict[Any, str]:
         smoothing._of_corners: f"({rows}, {points})",
         smoothing._alike: f"(i4[::1], i4[::1], {points}, f8)",
         smoothing.smoothed: f"({points}, i4[::1], i4[::1], {points}, i8, UniTuple(f8, 2))",
-        corners._faced: f"({points}, {rows}, {points}, {points}, {points}, f8[::1], i4[::1], i4[::1])",
+        bends._faced: f"({points}, {rows}, {points}, {points}, {points}, {points}, f8[::1], i4[::1], i4[::1])",
         sampling._crossed: f"({points}, {rows})",
         sampling._weights: f"({points}, {points}, {rows}, f8)",
         sampling._eliminate: "(i8[::1], i8[::1], f8[::1], i8)",

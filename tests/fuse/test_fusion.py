@@ -92,7 +92,9 @@ def test_closed_upright_and_of_the_true_size(case):
     assert cup.capacity_m3 == pytest.approx(case.shape.capacity_m3, rel=0.02)
 
 
-def test_cloud_is_uniform_and_its_normals_are_true(case):
+@pytest.mark.parametrize("name", [*MEASURED, "espresso_cup"])
+def test_cloud_is_uniform_and_its_normals_are_true(fusion, name):
+    case = fusion(name)
     cloud = pd.DataFrame(case.result.cloud)
     assert len(cloud) == OPTIONS["n_points"]
     places, normals = artefacts.points(cloud), artefacts.normals(cloud)

@@ -3,9 +3,11 @@
 import numpy as np
 
 from pipeline.columns import Columns
-from pipeline.fuse import corners
+from pipeline.fuse import bends
 from pipeline.fuse.smoothing import neighbours, sharpened, vertex_normals
 from pipeline.geometry.sampling import even_points, triangle_areas_and_normals
+
+_BENT_ROUNDS = 2  # of averaging the normals of tubes, lips and edges
 
 
 def cloud(
@@ -29,7 +31,8 @@ def cloud(
     normals = _interpolated(sharpened(of_vertices, near) if fused else of_vertices, around, weights)
     projected = np.clip(np.einsum("nc,nc->n", normals, facets[triangle]), 0.0, 1.0)
     if fused:
-        normals = corners.faced(points, around, normals, vertices_m, triangles, of_vertices, near)
+        means = _interpolated(vertex_normals(vertices_m, triangles, _BENT_ROUNDS), around, weights)
+        normals = bends.faced(points, around, normals, means, vertices_m, triangles, of_vertices, near)
     return {
         **dict(zip(("x_m", "y_m", "z_m", "nx", "ny", "nz"), np.hstack([points, normals]).T, strict=True)),
         "area_m2": area.sum() / n * projected,

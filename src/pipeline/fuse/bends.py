@@ -1,4 +1,8 @@
-"""Normals in hollow corners, which images and smoothing fill: each point there faces as the flat side does that it is nearer to."""
+"""Normals where a surface bends, which images and smoothing make round.
+
+In a hollow corner a point faces as the flat side does that it is nearer to. On a tube or a lip nothing is flat: there the mean over
+all around is right.
+"""
 
 import numba
 import numpy as np
@@ -7,9 +11,9 @@ from scipy.sparse import csr_matrix, diags
 from pipeline.geometry.sampling import triangle_areas_and_normals
 
 REACH_M = 0.004  # sides are looked for so far around: twice the radius to which a sharp corner is rounded
-HOLLOW_M = 0.0002  # the mean height of what is around a point above its tangent plane, from which on it is in a corner
+BENT_M = 0.0002  # the mean height of what is around a point above its tangent plane, or below it, from which on this is a bend
 # A vertex speaks for a point that is on its tangent plane and where its own surroundings are flat.
-OFF_PLANE_M, ROUGH = 0.0004, 0.15
+OFF_PLANE_M, ROUGH = 0.0005, 0.15
 ALIKE = 0.25  # between normals of one side
 _SAME_WALL_COSINE = 0.5  # the other side of a thin wall is near, too
 _ROUGH_RINGS, _STEPS = 2, 3
@@ -19,15 +23,17 @@ def faced(
     points_m: np.ndarray,
     corners: np.ndarray,
     normals: np.ndarray,
+    means: np.ndarray,
     vertices_m: np.ndarray,
     triangles: np.ndarray,
     of_vertices: np.ndarray,
     near: csr_matrix,
 ) -> np.ndarray:
-    """Return the unit normals (N, 3) of points (N, 3) in the triangles with `corners` (N, 3): in a hollow corner that of a side.
+    """Return the unit normals (N, 3) of points (N, 3) in the triangles with `corners` (N, 3).
 
-    of_vertices (V, 3): unit normals averaged little; near (V, V): 1 at each vertex's neighbours. The side is the mode of the
-    normals around: their mean would be neither side's (Fleishman, Cohen-Or & Silva 2005, robust fitting at sharp features).
+    normals (N, 3): where nothing bends. means (N, 3): where it bends outwards. Where it bends inwards, those of a side, by
+    of_vertices (V, 3): unit normals averaged little; near (V, V): 1 at each vertex's neighbours. It is the mode of the normals
+    around: their mean would be neither side's (Fleishman, Cohen-Or & Silva 2005, robust fitting at sharp features).
     """
     mean, around = diags(1 / np.diff(near.indptr)) @ near, of_vertices
     for _ in range(_ROUGH_RINGS):
@@ -36,17 +42,20 @@ def faced(
     area, _ = triangle_areas_and_normals(vertices_m, triangles)
     weight = np.bincount(triangles.ravel(), np.repeat(area, 3), len(vertices_m))
     weight *= np.exp(-0.5 * (rough / ROUGH) ** 2)
-    return _faced(points_m, corners, normals, vertices_m, of_vertices, weight, near.indptr, near.indices)
+    return _faced(points_m, corners, normals, means, vertices_m, of_vertices, weight, near.indptr, near.indices)
 
 
 @numba.njit(cache=True)
-def _faced(points, corners, normals, vertices, of_vertices, weight, start, neighbour):  # type: ignore[no-untyped-def]
+def _faced(points, corners, normals, means, vertices, of_vertices, weight, start, neighbour):  # type: ignore[no-untyped-def]
     found, asked_by = normals.copy(), np.full(len(vertices), -1)
     around, votes = np.zeros(len(vertices), np.int64), np.zeros(len(vertices))
     for i in range(len(points)):
         count = _gathered(i, points, corners, vertices, start, neighbour, asked_by, around)
         near = around[:count]
-        if _height(points[i], normals[i], vertices, near) > HOLLOW_M:
+        height = _height(points[i], normals[i], vertices, near)
+        if height < -BENT_M:
+            found[i] = means[i]
+        elif height > BENT_M:
             for a in range(count):
                 votes[a] = _vote(points[i], normals[i], vertices, of_vertices, weight, near[a])
             if votes[:count].sum() > 0:
