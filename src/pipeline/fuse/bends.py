@@ -42,7 +42,9 @@ def faced(
     area, _ = triangle_areas_and_normals(vertices_m, triangles)
     weight = np.bincount(triangles.ravel(), np.repeat(area, 3), len(vertices_m))
     weight *= np.exp(-0.5 * (rough / ROUGH) ** 2)
-    return _faced(points_m, corners, normals, means, vertices_m, of_vertices, weight, near.indptr, near.indices)
+    return _faced(
+        points_m, corners, normals, means, vertices_m, of_vertices, weight, near.indptr, near.indices
+    )
 
 
 @numba.njit(cache=True)

@@ -74,7 +74,9 @@ def _blocks(lowest, voxel, near, plane, view, projection, truncation):  # type: 
                 if near[i : i + BLOCK, j : j + BLOCK, k : k + BLOCK].any():
                     continue
                 z = (lowest[2] + k + middle) * voxel
-                count, free = _observed(x, y, z, column, plane, view, projection, truncation, LEAST_FREE, seen)
+                count, free = _observed(
+                    x, y, z, column, plane, view, projection, truncation, LEAST_FREE, seen
+                )
                 found[bx, by, bz] = FREE if free >= LEAST_FREE else UNSEEN if count + free == 0 else NEITHER
     return found
 

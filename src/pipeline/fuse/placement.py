@@ -169,7 +169,9 @@ def _platter_m(placement: Placement) -> float | None:
     return float(np.median(z[np.abs(z - height) < FLAT_M]))
 
 
-def _locally(points_m: np.ndarray, plane: Plane, placement: Placement, eyes: np.ndarray, on_it: bool) -> Plane:
+def _locally(
+    points_m: np.ndarray, plane: Plane, placement: Placement, eyes: np.ndarray, on_it: bool
+) -> Plane:
     """Return the plane fitted again to the table around the object, or to the base that it stands on."""
     x, y, _ = frames.apply(placement.T_object_world, points_m).T
     own = placement.covers(x, y)
