@@ -1,7 +1,7 @@
 """Normals where a surface bends, which images and smoothing make round.
 
 In a hollow corner a point faces as the flat side does that it is nearer to. On a tube or a lip nothing is flat: there the mean over
-all around is right.
+all around is right. Folds of noise face as what is around them.
 """
 
 import numba
@@ -15,6 +15,7 @@ BENT_M = 0.0002  # the mean height of what is around a point above its tangent p
 # A vertex speaks for a point that is on its tangent plane and where its own surroundings are flat.
 OFF_PLANE_M, ROUGH = 0.0005, 0.15
 ALIKE = 0.25  # between normals of one side
+FLAT = 0.5  # of the length that the sum of the normals around would have, were all alike: less is a lip, and no normal is wrong
 _SAME_WALL_COSINE = 0.5  # the other side of a thin wall is near, too
 _ROUGH_RINGS, _STEPS = 2, 3
 
@@ -55,6 +56,8 @@ def _faced(points, corners, normals, means, vertices, of_vertices, weight, start
         count = _gathered(i, points, corners, vertices, start, neighbour, asked_by, around)
         near = around[:count]
         height = _height(points[i], normals[i], vertices, near)
+        if _folded(normals[i], near, of_vertices, weight, found[i]):
+            continue
         if height < -BENT_M:
             found[i] = means[i]
         elif height > BENT_M:
@@ -84,6 +87,24 @@ def _gathered(i, points, corners, vertices, start, neighbour, asked_by, around):
                     count += 1
         done += 1
     return count
+
+
+@numba.njit(cache=True)
+def _folded(normal, near, of_vertices, weight, found):  # type: ignore[no-untyped-def]
+    """Return whether a normal (3,) is turned away from what is flat around it, as in a fold; if so, write the mean of that."""
+    total, mean, cosine = 0.0, np.zeros(3), 0.0
+    for j in near:
+        total += weight[j]
+        for k in range(3):
+            mean[k] += weight[j] * of_vertices[j, k]
+    length = np.sqrt((mean**2).sum())
+    for k in range(3):
+        cosine += mean[k] * normal[k]
+    folded = cosine < 0 and length > FLAT * total
+    if folded:
+        for k in range(3):
+            found[k] = mean[k] / length
+    return folded
 
 
 @numba.njit(cache=True)

@@ -197,5 +197,6 @@ def largest_component(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.n
     shape = (len(vertices), len(vertices))
     part = connected_components(coo_matrix((np.ones(len(edges)), edges.T), shape=shape), directed=False)[1]
     triangles = triangles[part[triangles[:, 0]] == np.bincount(part[triangles[:, 0]]).argmax()]
-    used, triangles = np.unique(triangles, return_inverse=True)
-    return vertices[used], triangles.reshape(-1, 3)
+    used = np.zeros(len(vertices), bool)
+    used[triangles] = True
+    return vertices[used], (np.cumsum(used) - 1)[triangles]
