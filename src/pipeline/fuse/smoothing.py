@@ -77,15 +77,19 @@ def smoothed(vertices, start, neighbour, move, rounds, factors):  # type: ignore
     """Return vertices (V, 3) with short waves smoothed away and volumes kept (Taubin 1995); move (V, 3) weighs the steps."""
     now, after = vertices.copy(), np.zeros_like(vertices)
     for step in range(rounds * len(factors)):
-        factor = factors[step % len(factors)]
-        for i in range(len(now)):
-            x, y, z = 0.0, 0.0, 0.0
-            for j in range(start[i], start[i + 1]):
-                near = neighbour[j]
-                x, y, z = x + now[near, 0], y + now[near, 1], z + now[near, 2]
-            share = 1.0 / (start[i + 1] - start[i])
-            after[i, 0] = now[i, 0] + factor * (x * share - now[i, 0]) * move[i, 0]
-            after[i, 1] = now[i, 1] + factor * (y * share - now[i, 1]) * move[i, 1]
-            after[i, 2] = now[i, 2] + factor * (z * share - now[i, 2]) * move[i, 2]
+        _step(now, after, start, neighbour, move, factors[step % len(factors)])
         now, after = after, now
     return now
+
+
+@numba.njit(cache=True)
+def _step(now, after, start, neighbour, move, factor):  # type: ignore[no-untyped-def]
+    """Write vertices (V, 3) moved by a share of the way to the mean of their neighbours to `after`."""
+    for i in range(len(now)):
+        x, y, z = 0.0, 0.0, 0.0
+        for near in neighbour[start[i] : start[i + 1]]:
+            x, y, z = x + now[near, 0], y + now[near, 1], z + now[near, 2]
+        share = 1.0 / (start[i + 1] - start[i])
+        after[i, 0] = now[i, 0] + factor * (x * share - now[i, 0]) * move[i, 0]
+        after[i, 1] = now[i, 1] + factor * (y * share - now[i, 1]) * move[i, 1]
+        after[i, 2] = now[i, 2] + factor * (z * share - now[i, 2]) * move[i, 2]
