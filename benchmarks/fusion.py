@@ -17,7 +17,7 @@ import open3d as o3d
 from pipeline.errors import PipelineError
 from pipeline.fuse import tsdf
 from pipeline.fuse.placement import find
-from pipeline.fuse.planes import behind_edge
+from pipeline.fuse.planes import inverse_depths
 from pipeline.fuse.raw import Views
 from pipeline.fuse.table import Placement
 from pipeline.geometry import frames
@@ -67,7 +67,7 @@ def plain(views: Views, placement: Placement, voxel_m: float, truncation_m: floa
     )
     K = views.intrinsics[0] + [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]  # Open3D truncates projected coordinates
     for depth_m, T_world_camera in zip(views.depths_m, views.T_world_cameras, strict=True):
-        depth = np.where(behind_edge(depth_m), 0, depth_m).astype(np.float32)
+        depth = np.where(inverse_depths(depth_m) > 0, depth_m, 0).astype(np.float32)
         image = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(depth)).filter_bilateral(5, 0.004, 1.5)
         T_camera_object = frames.inverse(placement.T_object_world @ T_world_camera)
         matrices = (o3d.core.Tensor.from_numpy(np.ascontiguousarray(m)) for m in (K, T_camera_object))
@@ -79,9 +79,7 @@ def plain(views: Views, placement: Placement, voxel_m: float, truncation_m: floa
         target[index] = grid.attribute(name).reshape((-1,)).numpy()[flat]
     value = tsdf.regularised(value, weight)
     value[~covered] = 1.0
-    vertices, triangles = tsdf.largest_component(
-        *tsdf.canonical(*tsdf._marched(value, lowest, voxel_m, "plain"))
-    )
+    vertices, triangles = tsdf._marched(value * truncation_m, lowest, voxel_m, "plain")
     base = vertices[:, 2] < tsdf._table_layers(voxel_m) * voxel_m
     vertices[base, 2] = 0.0
     return tsdf.Surface(vertices, triangles, ~base, ~base)

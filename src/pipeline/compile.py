@@ -65,12 +65,13 @@ STAGES: dict[str, Callable[[], list[str]]] = {"fuse": fuse, "simulate": simulate
 
 def fuse_types() -> dict[Any, str]:
     """Return the functions that fusion calls and the types that it calls them with, as numba writes them."""
-    from pipeline.fuse import measuring, planes, smoothing
+    from pipeline.fuse import bends, measuring, planes, smoothing
     from pipeline.geometry import sampling
 
     points, rows, views = "f8[:,::1]", "i8[:,::1]", "f4[:,::1], i8[:,::1], f8[:,:,::1]"
     return {
-        planes._fitted: f"(f4[:,::1], {points}, {points}, {points})",
+        planes.inverse_depths: "(Array(float32, 2, 'A', False, aligned=True),)",
+        planes._fitted: f"({points}, {points}, {points}, {points})",
         measuring.signed_distances: f"(i8[::1], f8, b1[:,::1], b1[::1], b1[:,:,::1], {views}, f8)",
         measuring.offsets: f"({points}, {points}, {views}, f8)",
         measuring.outlines: f"({points}, {points}, b1[::1], {views}, {points})",
@@ -78,6 +79,9 @@ def fuse_types() -> dict[Any, str]:
         smoothing._of_corners: f"({rows}, {points})",
         smoothing._alike: f"(i4[::1], i4[::1], {points}, f8)",
         smoothing.smoothed: f"({points}, i4[::1], i4[::1], {points}, i8, UniTuple(f8, 2))",
+        bends._faced: f"({points}, {rows}, {points}, {points}, {points}, {points}, f8[::1], i4[::1], i4[::1])",
+        sampling._crossed: f"({points}, {rows})",
+        sampling._weights: f"({points}, {points}, {rows}, f8)",
         sampling._eliminate: "(i8[::1], i8[::1], f8[::1], i8)",
     }
 

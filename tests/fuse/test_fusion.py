@@ -10,7 +10,6 @@ import trimesh
 
 from pipeline import artefacts
 from pipeline.errors import PipelineError
-from pipeline.fuse import tsdf
 from pipeline.fuse.fusion import fused
 from pipeline.geometry import frames
 from pipeline.geometry.cavity import cavity
@@ -93,7 +92,9 @@ def test_closed_upright_and_of_the_true_size(case):
     assert cup.capacity_m3 == pytest.approx(case.shape.capacity_m3, rel=0.02)
 
 
-def test_cloud_is_uniform_and_its_normals_are_true(case):
+@pytest.mark.parametrize("name", [*MEASURED, "espresso_cup"])
+def test_cloud_is_uniform_and_its_normals_are_true(fusion, name):
+    case = fusion(name)
     cloud = pd.DataFrame(case.result.cloud)
     assert len(cloud) == OPTIONS["n_points"]
     places, normals = artefacts.points(cloud), artefacts.normals(cloud)
@@ -159,19 +160,6 @@ def test_any_world_frame_gives_the_same_object(scan, tmp_path):
     points = truth.cloud(good.shape, 10_000, np.random.default_rng(4))
     places = frames.apply(T_object_truth, artefacts.points(points[points.inner])).astype(np.float32)
     assert scene_of(*result.mesh).compute_distance(places).numpy().mean() < 0.0004
-
-
-def test_canonical_order_does_not_depend_on_the_first():
-    rng = np.random.default_rng(5)
-    ball = trimesh.creation.icosphere(2)
-    vertices, triangles = tsdf.canonical(ball.vertices, ball.faces)
-    order = rng.permutation(len(ball.vertices))
-    mixed = np.argsort(order)[ball.faces][rng.permutation(len(ball.faces))]
-    mixed = np.roll(mixed, 1, axis=1)
-    other_vertices, other_triangles = tsdf.canonical(ball.vertices[order], mixed)
-    np.testing.assert_array_equal(vertices, other_vertices)
-    np.testing.assert_array_equal(triangles, other_triangles)
-    assert trimesh.Trimesh(vertices, triangles, process=False).volume == pytest.approx(ball.volume)
 
 
 @pytest.mark.parametrize(

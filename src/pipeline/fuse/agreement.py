@@ -88,7 +88,7 @@ class Sample:
 def _sample(views: Views, rng: np.random.Generator) -> Sample:
     points = []
     for depth, K in zip(views.depths_m, views.intrinsics, strict=True):
-        known = np.flatnonzero(depth)
+        known = np.flatnonzero(depth > 0)
         chosen = rng.integers(len(known), size=POINTS) if len(known) else np.zeros(0, int)
         v, u = np.divmod(known[chosen], depth.shape[1])
         points.append(unprojected(u, v, depth[v, u], K))

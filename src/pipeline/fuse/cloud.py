@@ -3,8 +3,11 @@
 import numpy as np
 
 from pipeline.columns import Columns
-from pipeline.fuse.smoothing import sharpened, vertex_normals
+from pipeline.fuse import bends
+from pipeline.fuse.smoothing import neighbours, sharpened, vertex_normals
 from pipeline.geometry.sampling import even_points, triangle_areas_and_normals
+
+_BENT_ROUNDS = 2  # of averaging the normals of tubes, lips and edges
 
 
 def cloud(
@@ -20,20 +23,27 @@ def cloud(
     A point's area is that of its share of the surface, projected along its normal: what the noise roughens by adds none.
     """
     points, triangle = even_points(vertices_m, triangles, n, rng)
-    corners = triangles[triangle]
-    weights = _barycentric(points, vertices_m[corners])[..., None]
+    around = triangles[triangle]
+    weights = _barycentric(points, vertices_m[around])[..., None]
     area, facets = triangle_areas_and_normals(vertices_m, triangles)
     of_vertices = vertex_normals(vertices_m, triangles, int(fused))
-    if fused:
-        of_vertices = sharpened(of_vertices, triangles)
-    normals = (of_vertices[corners] * weights).sum(axis=1)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    near = neighbours(triangles, len(vertices_m))
+    normals = _interpolated(sharpened(of_vertices, near) if fused else of_vertices, around, weights)
     projected = np.clip(np.einsum("nc,nc->n", normals, facets[triangle]), 0.0, 1.0)
+    if fused:
+        means = _interpolated(vertex_normals(vertices_m, triangles, _BENT_ROUNDS), around, weights)
+        normals = bends.faced(points, around, normals, means, vertices_m, triangles, of_vertices, near)
     return {
         **dict(zip(("x_m", "y_m", "z_m", "nx", "ny", "nz"), np.hstack([points, normals]).T, strict=True)),
         "area_m2": area.sum() / n * projected,
-        "seen": (seen[corners] * weights[..., 0]).sum(axis=1) > 0.5,
+        "seen": (seen[around] * weights[..., 0]).sum(axis=1) > 0.5,
     }
+
+
+def _interpolated(of_vertices: np.ndarray, around: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Return the unit mean (N, 3) of values (V, 3) at the corners `around` (N, 3) of each point's triangle."""
+    mean = (of_vertices[around] * weights).sum(axis=1)
+    return mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300)
 
 
 def _barycentric(points: np.ndarray, corners: np.ndarray) -> np.ndarray:

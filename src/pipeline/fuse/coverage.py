@@ -21,7 +21,9 @@ def parts(surface: Surface) -> dict[str, np.ndarray]:
     edge = _border(surface.triangles, inner) & above
     rim = np.zeros(len(above), bool)
     if edge.any():
-        rim = above & (cKDTree(surface.vertices_m[edge]).query(surface.vertices_m)[0] <= RIM_M)
+        rim = above & np.isfinite(
+            cKDTree(surface.vertices_m[edge]).query(surface.vertices_m, distance_upper_bound=RIM_M)[0]
+        )
     level = vertex_normals(surface.vertices_m, surface.triangles, 1)[:, 2] > FLOOR_COSINE
     return {
         "inner_wall": inner & ~rim & ~level,

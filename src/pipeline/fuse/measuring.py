@@ -9,6 +9,9 @@ import numpy as np
 
 LEAST_FREE = 2  # views that see a voxel free, far from every surface: enough to believe it
 SURELY_FREE = 12  # views that see past, and none before them that sees a surface: the others are not asked
+# Blocks of so many voxels a side, and what they are: see `_blocks`.
+BLOCK = 4
+SURFACE, FREE, UNSEEN, NEITHER = 0, 1, 2, 3
 # A view that sees past a voxel counts less than one that sees the surface near it: at a lip, where half of the views see past,
 # the mean is then zero in walls of some millimetres.
 FREE_WORTH = 0.4
@@ -26,9 +29,11 @@ def signed_distances(lowest, voxel, columns, layers, near, plane, view, projecti
     """Return signed distances (nx, ny, nz) in truncations, positive in the open, and how many views told.
 
     lowest (3,): coordinates of the first voxel. columns (nx, ny), layers (nz,): where to look at all. near (nx, ny,
-    nz): where a surface may be; elsewhere two views that see past are enough. The arrays of `Planes`; truncation in metres.
+    nz): where a surface may be; elsewhere two views that see past are enough, and amid blocks that are all free or all
+    unseen no view is asked. The arrays of `Planes`; truncation in metres.
     """
     nx, ny, nz = near.shape
+    amid = _amid(_blocks(lowest, voxel, near, plane, view, projection, truncation))
     value, weight = np.zeros((nx, ny, nz), np.float32), np.zeros((nx, ny, nz), np.float32)
     seen, column = np.zeros((len(view), 5)), np.zeros((len(view), 3))
     for ix in range(nx):
@@ -36,12 +41,13 @@ def signed_distances(lowest, voxel, columns, layers, near, plane, view, projecti
             if not columns[ix, iy]:
                 continue
             x, y = (lowest[0] + ix) * voxel, (lowest[1] + iy) * voxel
-            # One number at a time: assigning to a slice compiles numba's text of an error that cannot be, for seconds.
-            for k in range(len(view)):
-                for c in range(3):
-                    column[k, c] = projection[k, c, 0] * x + projection[k, c, 1] * y + projection[k, c, 3]
+            _project(x, y, projection, column)
             for iz in range(nz):
-                if not layers[iz]:
+                block = amid[ix // BLOCK, iy // BLOCK, iz // BLOCK]
+                if not layers[iz] or block == UNSEEN:
+                    continue
+                if block == FREE:
+                    value[ix, iy, iz], weight[ix, iy, iz] = 1.0, LEAST_FREE
                     continue
                 z = (lowest[2] + iz) * voxel
                 enough = len(view) if near[ix, iy, iz] else LEAST_FREE
@@ -50,6 +56,54 @@ def signed_distances(lowest, voxel, columns, layers, near, plane, view, projecti
                     distance = _nearest_side(seen[:count], free * FREE_WORTH, truncation)
                     value[ix, iy, iz], weight[ix, iy, iz] = distance / truncation, count + free
     return value, weight
+
+
+@numba.njit(cache=True)
+def _blocks(lowest, voxel, near, plane, view, projection, truncation):  # type: ignore[no-untyped-def]
+    """Return of each block of voxels what its middle is: free, unseen, or neither; or that a surface may be in it."""
+    shape = [-(-n // BLOCK) for n in near.shape]
+    found = np.full((shape[0], shape[1], shape[2]), SURFACE, np.int8)
+    seen, column = np.zeros((len(view), 5)), np.zeros((len(view), 3))
+    middle = (BLOCK - 1) / 2
+    for bx in range(shape[0]):
+        for by in range(shape[1]):
+            x, y = (lowest[0] + bx * BLOCK + middle) * voxel, (lowest[1] + by * BLOCK + middle) * voxel
+            _project(x, y, projection, column)
+            for bz in range(shape[2]):
+                i, j, k = bx * BLOCK, by * BLOCK, bz * BLOCK
+                if near[i : i + BLOCK, j : j + BLOCK, k : k + BLOCK].any():
+                    continue
+                z = (lowest[2] + k + middle) * voxel
+                count, free = _observed(
+                    x, y, z, column, plane, view, projection, truncation, LEAST_FREE, seen
+                )
+                found[bx, by, bz] = FREE if free >= LEAST_FREE else UNSEEN if count + free == 0 else NEITHER
+    return found
+
+
+@numba.njit(cache=True)
+def _amid(blocks):  # type: ignore[no-untyped-def]
+    """Return the blocks with those that border on another kind, but for surfaces, as `NEITHER`."""
+    found = blocks.copy()
+    nx, ny, nz = blocks.shape
+    for i in range(nx):
+        for j in range(ny):
+            for k in range(nz):
+                around = blocks[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2, max(k - 1, 0) : k + 2]
+                for other in around.flat:
+                    unlike = other != blocks[i, j, k]
+                    if unlike and other != SURFACE:
+                        found[i, j, k] = NEITHER
+    return found
+
+
+@numba.njit(cache=True)
+def _project(x, y, projection, column):  # type: ignore[no-untyped-def]
+    """Write the part of the projections that is the same for all z to `column` (V, 3)."""
+    # One number at a time: assigning to a slice compiles numba's text of an error that cannot be, for seconds.
+    for k in range(len(projection)):
+        for c in range(3):
+            column[k, c] = projection[k, c, 0] * x + projection[k, c, 1] * y + projection[k, c, 3]
 
 
 @numba.njit(cache=True)
@@ -157,9 +211,9 @@ def offsets(vertices, normals, plane, view, projection, reach):  # type: ignore[
     """Return how far (V,) along its normal each vertex (V, 3) must go to the planes that face its side, and their weight (V,)."""
     n = len(vertices)
     offset, weight = np.zeros(n), np.zeros(n)
-    for i in range(n):
-        x, y, z = vertices[i]
-        for k in range(len(view)):
+    for k in range(len(view)):  # one after the other: a view's planes stay in the processor's cache
+        for i in range(n):
+            x, y, z = vertices[i]
             row = _pixel(x, y, z, k, view, projection)
             if row < 0 or plane[row, 4] <= 0:
                 continue

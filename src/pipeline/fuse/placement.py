@@ -30,6 +30,7 @@ OTHERS = 12  # views that are asked whether they look through a point
 # What is nearer together is one thing; in a single view its own shadow lies between its parts.
 GAP_M, SHADOW_M = 0.016, 0.12
 AROUND_M = 0.15  # the table is fitted again this far around the object: depth cameras bend large planes
+_ASKED = 300_000  # points speak for all of them
 _HITS_OF_NOISE = 3  # stray pixels hit a cell once or twice; a cell of the object is hit by many views
 
 
@@ -70,16 +71,17 @@ def find(views: Views, name: str, rng: np.random.Generator) -> tuple[Plane, Plac
     points, middle = table.world_points(views), table.focus(views)
     x, y, z = (points.places_m - middle).T
     near = points.only(x * x + y * y + z * z < table.NEAR_M**2)
+    some = table.thinned(near.places_m, _ASKED)
     eyes = np.array([T[:3, 3] for T in views.T_world_cameras])
     failures: list[NoObject] = []
     for plane in table.planes(near.places_m, eyes, name, rng):
         try:
-            first = place(near, _above(near, plane, views), plane, middle, views, name)
+            first = place(some, _above(near, plane, views), plane, middle, views, name)
             height_m = _platter_m(first)
             if height_m is not None:
                 plane = Plane(plane.normal, plane.offset_m - height_m, plane.rms_m)
-            plane = _locally(near, plane, first, eyes, on_it=height_m is not None)
-            return plane, place(near, _above(near, plane, views), plane, middle, views, name)
+            plane = _locally(some, plane, first, eyes, on_it=height_m is not None)
+            return plane, place(some, _above(near, plane, views), plane, middle, views, name)
         except NoObject as failure:
             failures.append(failure)
     raise failures[0]
@@ -94,7 +96,7 @@ def on_a_plane(points_m: np.ndarray, name: str, rng: np.random.Generator) -> tup
         above = points.only((height > ABOVE_M) & (height < LARGEST_M))
         try:
             middle = np.median(above.places_m, axis=0) if len(above.view) else points_m[0]
-            return plane, place(points, above, plane, middle, None, name)
+            return plane, place(points_m, above, plane, middle, None, name)
         except NoObject as error:
             failure = failure or error
     raise failure or NoObject(f"{name}: expected a table under the object, found none")
@@ -110,14 +112,18 @@ def _above(points: Points, plane: Plane, views: Views) -> Points:
 
 def spread_m(height_m: np.ndarray) -> float:
     """Return the standard deviation of the table's points, from heights (N,) of all: the depth camera's noise."""
+    height_m = table.thinned(height_m, _ASKED)
     table_m = height_m[np.abs(height_m) < MOST_ABOVE_M]
     return 1.4826 * float(np.median(np.abs(table_m - np.median(table_m)))) if len(table_m) else 0.0
 
 
 def place(
-    points: Points, above: Points, plane: Plane, focus: np.ndarray, views: Views | None, name: str
+    points_m: np.ndarray, above: Points, plane: Plane, focus: np.ndarray, views: Views | None, name: str
 ) -> Placement:
-    """Return where the object stands on the plane: what of the points above it is nearest to the focus (3,)."""
+    """Return where the object stands on the plane: what of the points above it is nearest to the focus (3,).
+
+    points_m (N, 3): points all around, as many as are needed to know whether some are below the plane.
+    """
     T_table_world = table_frame(plane)
     places = frames.apply(T_table_world, above.places_m)
     middle = frames.apply(T_table_world, focus)[:2]
@@ -138,7 +144,7 @@ def place(
     centre = np.array([*cluster.centre_m, 0.0])
     T_object_world = frames.transform(np.eye(3), -centre) @ T_table_world
     placement = Placement(T_object_world, *_region(own - centre), own - centre)
-    _check_below(placement, frames.apply(T_object_world, points.places_m), name)
+    _check_below(placement, frames.apply(T_object_world, points_m), name)
     return placement
 
 
@@ -163,17 +169,19 @@ def _platter_m(placement: Placement) -> float | None:
     return float(np.median(z[np.abs(z - height) < FLAT_M]))
 
 
-def _locally(points: Points, plane: Plane, placement: Placement, eyes: np.ndarray, on_it: bool) -> Plane:
+def _locally(
+    points_m: np.ndarray, plane: Plane, placement: Placement, eyes: np.ndarray, on_it: bool
+) -> Plane:
     """Return the plane fitted again to the table around the object, or to the base that it stands on."""
-    x, y, _ = frames.apply(placement.T_object_world, points.places_m).T
+    x, y, _ = frames.apply(placement.T_object_world, points_m).T
     own = placement.covers(x, y)
     if on_it:
-        return table.refined(points.places_m[own], plane.normal, plane.offset_m, eyes)
+        return table.refined(points_m[own], plane.normal, plane.offset_m, eyes)
     low, high = placement.bounds_m[0] - AROUND_M, placement.bounds_m[1] + AROUND_M
     around = (x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1]) & ~own
     if np.count_nonzero(around) < LEAST_POINTS:
         return plane
-    return table.refined(points.places_m[around], plane.normal, plane.offset_m, eyes)
+    return table.refined(points_m[around], plane.normal, plane.offset_m, eyes)
 
 
 def table_frame(plane: Plane) -> np.ndarray:

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from scipy.ndimage import minimum_filter
 
 from pipeline.fuse.layouts import Views
 from pipeline.fuse.table import Placement
@@ -45,8 +44,7 @@ def planes(views: Views, placement: Placement) -> Planes:
         low, high = _window(corners, K, T_object_camera, depth_m.shape)
         K = K - [[0, 0, low[0]], [0, 0, low[1]], [0, 0, 0]]
         depth_m = depth_m[low[1] : high[1], low[0] : high[0]]
-        usable = np.where(behind_edge(depth_m), 0, depth_m).astype(np.float32)
-        parts.append(_fitted(usable, K, T_object_camera, placement.bounds_m))
+        parts.append(_fitted(inverse_depths(depth_m), K, T_object_camera, placement.bounds_m))
         windows.append((start, *(high - low)))
         projections.append(K @ frames.inverse(T_object_camera)[:3])
         start += len(parts[-1])
@@ -54,9 +52,23 @@ def planes(views: Views, placement: Placement) -> Planes:
     return Planes(np.concatenate(parts), np.array(windows, np.int64), np.array(projections), eyes)
 
 
-def behind_edge(depth_m: np.ndarray) -> np.ndarray:
-    """Return where (H, W) a pixel lies far behind one of its eight neighbours."""
-    return depth_m - minimum_filter(np.where(depth_m > 0, depth_m, np.inf), 3) > EDGE_JUMP_M
+@numba.njit(cache=True)
+def inverse_depths(depth):  # type: ignore[no-untyped-def]
+    """Return the inverse depths (H, W), 0 where there is none or a pixel lies far behind one of its eight neighbours."""
+    height, width = depth.shape
+    inverses = np.zeros((height, width))
+    for v in range(height):
+        for u in range(width):
+            if depth[v, u] <= 0:
+                continue
+            nearest = depth[v, u]
+            for j in range(max(v - 1, 0), min(v + 2, height)):
+                for i in range(max(u - 1, 0), min(u + 2, width)):
+                    if 0 < depth[j, i] < nearest:
+                        nearest = depth[j, i]
+            if depth[v, u] - nearest <= EDGE_JUMP_M:
+                inverses[v, u] = 1.0 / depth[v, u]
+    return inverses
 
 
 def _window(
@@ -73,20 +85,20 @@ def _window(
 
 
 @numba.njit(cache=True)
-def _fitted(depth, K, T_object_camera, bounds):  # type: ignore[no-untyped-def]
-    """Return the planes (H · W, 5) of a window's depths (H, W)."""
-    height, width = depth.shape
+def _fitted(inverses, K, T_object_camera, bounds):  # type: ignore[no-untyped-def]
+    """Return the planes (H · W, 5) of a window's inverse depths (H, W)."""
+    height, width = inverses.shape
     weights = _weights()
     out = np.zeros((height * width, 5), np.float32)
     for v in range(height):
         for u in range(width):
-            z = depth[v, u]
-            if z <= 0:
+            if inverses[v, u] <= 0:
                 continue
+            z = 1.0 / inverses[v, u]
             x, y = (u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1]
-            inverse, along, across = 1.0 / z, 0.0, 0.0
+            inverse, along, across = inverses[v, u], 0.0, 0.0
             if _within(x * z, y * z, z, T_object_camera, bounds):
-                inverse, along, across, count = _plane_at(depth, weights, v, u)
+                inverse, along, across, count = _plane_at(inverses, weights, v, u)
                 if count < _LEAST_PIXELS:
                     continue
             # On a plane a·x + b·y + c = 1/z, where (x, y, 1) is the ray: its normal is (a, b, c).
@@ -117,27 +129,28 @@ def _weights():  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _plane_at(depth, weights, v, u):  # type: ignore[no-untyped-def]
+def _plane_at(inverses, weights, v, u):  # type: ignore[no-untyped-def]
     """Return inverse depth, its two slopes a pixel and the number of pixels: a small fit, then one gated by it."""
-    inverse, along, across, count = _fit(depth, weights, v, u, 1, 2 * GATE_M, 1.0 / depth[v, u], 0.0, 0.0)
+    inverse, along, across, count = _fit(inverses, weights, v, u, 1, 2 * GATE_M, inverses[v, u], 0.0, 0.0)
     if count < _LEAST_PIXELS:
         return inverse, along, across, count
-    return _fit(depth, weights, v, u, RADIUS_PX, GATE_M, inverse, along, across)
+    return _fit(inverses, weights, v, u, RADIUS_PX, GATE_M, inverse, along, across)
 
 
 @numba.njit(cache=True)
-def _fit(depth, weights, v, u, radius, gate, inverse, along, across):  # type: ignore[no-untyped-def]
+def _fit(inverses, weights, v, u, radius, gate, inverse, along, across):  # type: ignore[no-untyped-def]
     """Fit inverse depth, in which planes are linear, to the pixels whose depth is within `gate` of the plane given."""
-    height, width = depth.shape
+    height, width = inverses.shape
     w0, wu, wv, wuu, wuv, wvv, wq, wuq, wvq = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     count = 0
     for j in range(max(v - radius, 0), min(v + radius + 1, height)):
         for i in range(max(u - radius, 0), min(u + radius + 1, width)):
-            du, dv = i - u, j - v
+            du, dv, q = i - u, j - v, inverses[j, i]
             expected = inverse + along * du + across * dv
-            if depth[j, i] <= 0 or expected <= 0 or abs(depth[j, i] - 1.0 / expected) > gate:
+            # The depths are further apart than the gate, without a division.
+            if q <= 0 or expected <= 0 or abs(expected - q) > gate * expected * q:
                 continue
-            w, q = weights[RADIUS_PX + dv, RADIUS_PX + du], 1.0 / depth[j, i]
+            w = weights[RADIUS_PX + dv, RADIUS_PX + du]
             w0, wu, wv, wq = w0 + w, wu + w * du, wv + w * dv, wq + w * q
             wuu, wuv, wvv = wuu + w * du * du, wuv + w * du * dv, wvv + w * dv * dv
             wuq, wvq = wuq + w * du * q, wvq + w * dv * q

@@ -4,7 +4,7 @@ import numba
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
-from pipeline.geometry.sampling import triangle_areas_and_normals
+from pipeline.geometry.sampling import crossed
 
 # Rounds of, and width of, the bilateral filter of normals (Zheng et al. 2011): a corner's two sides do not mix.
 SHARPENINGS, ALIKE = 5, 0.1
@@ -19,8 +19,7 @@ def neighbours(triangles: np.ndarray, n: int) -> csr_matrix:
 
 def vertex_normals(vertices_m: np.ndarray, triangles: np.ndarray, smooth: int) -> np.ndarray:
     """Return unit normals (V, 3): of the triangles around each vertex by area, then averaged `smooth` times."""
-    area, normals = triangle_areas_and_normals(vertices_m, triangles)
-    vectors = _around(triangles, normals * area[:, None], len(vertices_m))
+    vectors = _around(triangles, crossed(vertices_m, triangles), len(vertices_m))
     for _ in range(smooth):
         vectors = _around(triangles, _of_corners(triangles, vectors), len(vertices_m))
     return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300)
@@ -48,9 +47,8 @@ def _of_corners(triangles, values):  # type: ignore[no-untyped-def]
     return total
 
 
-def sharpened(normals: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return unit normals (V, 3) of a closed mesh averaged with those neighbours' that are much alike."""
-    near = neighbours(triangles, len(normals))
+def sharpened(normals: np.ndarray, near: csr_matrix) -> np.ndarray:
+    """Return unit normals (V, 3) averaged with those neighbours' that are much alike; near (V, V): 1 at neighbours."""
     for _ in range(SHARPENINGS):
         normals = _alike(near.indptr, near.indices, normals, ALIKE)
     return normals
@@ -79,15 +77,19 @@ def smoothed(vertices, start, neighbour, move, rounds, factors):  # type: ignore
     """Return vertices (V, 3) with short waves smoothed away and volumes kept (Taubin 1995); move (V, 3) weighs the steps."""
     now, after = vertices.copy(), np.zeros_like(vertices)
     for step in range(rounds * len(factors)):
-        factor = factors[step % len(factors)]
-        for i in range(len(now)):
-            x, y, z = 0.0, 0.0, 0.0
-            for j in range(start[i], start[i + 1]):
-                near = neighbour[j]
-                x, y, z = x + now[near, 0], y + now[near, 1], z + now[near, 2]
-            count = start[i + 1] - start[i]
-            after[i, 0] = now[i, 0] + factor * (x / count - now[i, 0]) * move[i, 0]
-            after[i, 1] = now[i, 1] + factor * (y / count - now[i, 1]) * move[i, 1]
-            after[i, 2] = now[i, 2] + factor * (z / count - now[i, 2]) * move[i, 2]
+        _step(now, after, start, neighbour, move, factors[step % len(factors)])
         now, after = after, now
     return now
+
+
+@numba.njit(cache=True)
+def _step(now, after, start, neighbour, move, factor):  # type: ignore[no-untyped-def]
+    """Write vertices (V, 3) moved by a share of the way to the mean of their neighbours to `after`."""
+    for i in range(len(now)):
+        x, y, z = 0.0, 0.0, 0.0
+        for near in neighbour[start[i] : start[i + 1]]:
+            x, y, z = x + now[near, 0], y + now[near, 1], z + now[near, 2]
+        share = 1.0 / (start[i + 1] - start[i])
+        after[i, 0] = now[i, 0] + factor * (x * share - now[i, 0]) * move[i, 0]
+        after[i, 1] = now[i, 1] + factor * (y * share - now[i, 1]) * move[i, 1]
+        after[i, 2] = now[i, 2] + factor * (z * share - now[i, 2]) * move[i, 2]

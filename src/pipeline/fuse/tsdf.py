@@ -1,4 +1,4 @@
-"""Depth images to one closed surface: a truncated signed distance, Open3D's marching cubes, and a refinement of what comes out."""
+"""Depth images to one closed surface: a truncated signed distance, its surface, and a refinement of what comes out."""
 
 from dataclasses import dataclass
 
@@ -12,6 +12,7 @@ from pipeline.fuse.planes import Planes, planes
 from pipeline.fuse.refinement import refined
 from pipeline.fuse.table import Placement
 from pipeline.fuse.walls import parted
+from pipeline.fuse.wrapping import Field
 
 BLOCK = 8
 # The table's own surface, fused, stays below this height: what is lower counts as table.
@@ -24,7 +25,6 @@ EXCESS_RAMP_M = 0.003
 LEAST_VOTES, PRIOR_VOTES, UNSEEN_VOTE = 0.2, 0.5, 0.1
 LEAST_WEIGHT = 0.3  # of the cosines under which pixels saw a vertex, for it to count as seen: one view at 70°
 _AROUND = 2  # voxels around one, to which its value is drawn
-_LEAST_VALUE = 0.02  # of the truncation: keeps vertices apart from grid points, so that no triangle is empty
 
 
 @dataclass(frozen=True)
@@ -65,9 +65,8 @@ def fuse(views: Views, placement: Placement, voxel_m: float, truncation_m: float
     table_closed_m2 = float(walled_in[:, :, floor].sum()) * voxel_m**2
     value[:, :, floor][walled_in[:, :, floor]] = -1.0
     vertices, triangles = _marched(
-        value, lowest, voxel_m, f"{name}: expected a surface from {len(views.depths_m)} views"
+        value * truncation_m, lowest, voxel_m, f"{name}: expected a surface from {len(views.depths_m)} views"
     )
-    vertices, triangles = largest_component(*canonical(vertices, triangles))
     base = vertices[:, 2] < _table_layers(voxel_m) * voxel_m
     vertices[base, 2] = 0.0
     inner = touches(vertices, ~base, walled_in, lowest, voxel_m)
@@ -130,33 +129,13 @@ def _near(
 
 
 def _marched(
-    value: np.ndarray, lowest: np.ndarray, voxel_m: float, expected: str
+    distance_m: np.ndarray, lowest: np.ndarray, voxel_m: float, expected: str
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the surface where the values (nx, ny, nz) change their sign, by marching cubes in the blocks that need it."""
-    from pipeline.geometry.open3d_core import open3d as o3d
-
-    value = np.where(np.abs(value) < _LEAST_VALUE, np.copysign(_LEAST_VALUE, value), value).astype(np.float32)
-    nx, ny, nz = (n // BLOCK for n in value.shape)
-    blocks = value.reshape(nx, BLOCK, ny, BLOCK, nz, BLOCK).transpose(
-        0, 2, 4, 5, 3, 1
-    )  # in a block x runs fastest
-    inside = (3, 4, 5)
-    around = np.ones((3, 3, 3))
-    held = ndimage.binary_dilation((blocks < 0).any(axis=inside), around)
-    held &= ndimage.binary_dilation((blocks > 0).any(axis=inside), around)
-    places = np.argwhere(held)
-    keys = np.ascontiguousarray(places + lowest // BLOCK, np.int32)
-    one = o3d.core.SizeVector([1])
-    grid = o3d.t.geometry.VoxelBlockGrid(
-        ("tsdf", "weight"), (o3d.core.float32,) * 2, (one, one), voxel_m, BLOCK, max(len(keys), 1)
-    )
-    index = grid.hashmap().activate(o3d.core.Tensor.from_numpy(keys))[0].numpy()
-    grid.attribute("tsdf").numpy()[index] = blocks[tuple(places.T)][..., None]
-    grid.attribute("weight").numpy()[index] = 1.0
-    mesh = grid.extract_triangle_mesh(0.5, -1)
-    if mesh.is_empty() or len(mesh.triangle.indices) == 0:
+    """Return the largest surface where the distances (nx, ny, nz) change their sign."""
+    vertices, triangles = Field(-distance_m, lowest * voxel_m, voxel_m).surface()
+    if len(triangles) == 0:
         raise PipelineError(f"{expected}, found none; check poses and units")
-    return mesh.vertex.positions.numpy().astype(float), mesh.triangle.indices.numpy()
+    return largest_component(vertices, triangles)
 
 
 def _table_layers(voxel_m: float) -> int:
@@ -209,17 +188,6 @@ def touches(
     return wanted & near[tuple(place.T)]
 
 
-def canonical(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the same mesh in one order: Open3D's depends on its hash map and its threads."""
-    order = np.lexsort(vertices.T)
-    rank = np.zeros(len(order), np.int64)
-    rank[order] = np.arange(len(order))
-    triangles = rank[triangles]
-    first = triangles.argmin(axis=1)[:, None]
-    triangles = np.take_along_axis(triangles, (first + np.arange(3)) % 3, axis=1)
-    return vertices[order], triangles[np.lexsort(triangles.T[::-1])]
-
-
 def largest_component(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the connected part with the most triangles, unused vertices removed."""
     from scipy.sparse import coo_matrix
@@ -229,5 +197,6 @@ def largest_component(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.n
     shape = (len(vertices), len(vertices))
     part = connected_components(coo_matrix((np.ones(len(edges)), edges.T), shape=shape), directed=False)[1]
     triangles = triangles[part[triangles[:, 0]] == np.bincount(part[triangles[:, 0]]).argmax()]
-    used, triangles = np.unique(triangles, return_inverse=True)
-    return vertices[used], triangles.reshape(-1, 3)
+    used = np.zeros(len(vertices), bool)
+    used[triangles] = True
+    return vertices[used], (np.cumsum(used) - 1)[triangles]

@@ -12,7 +12,9 @@ def transform(rotation: np.ndarray, translation: np.ndarray) -> np.ndarray:
 
 def apply(T_a_b: np.ndarray, points_b: np.ndarray) -> np.ndarray:
     """Return points (..., 3) of frame b in frame a."""
-    return points_b @ T_a_b[:3, :3].T + T_a_b[:3, 3]
+    points_a = points_b @ T_a_b[:3, :3].T
+    points_a += T_a_b[:3, 3]
+    return points_a
 
 
 def rotate(T_a_b: np.ndarray, vectors_b: np.ndarray) -> np.ndarray:

@@ -13,11 +13,25 @@ def triangle_areas_and_normals(
     vertices_m: np.ndarray, triangles: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return areas (F,) in m² and unit normals (F, 3) of triangles (F, 3); the normal of an empty triangle is zero."""
-    a, b, c = np.moveaxis(vertices_m[triangles], 1, 0)
-    (ux, uy, uz), (vx, vy, vz) = (b - a).T, (c - a).T
-    cross = np.stack([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx], axis=1)
+    cross = crossed(vertices_m, triangles)
     double = np.sqrt(cross[:, 0] ** 2 + cross[:, 1] ** 2 + cross[:, 2] ** 2)
     return double / 2, cross / np.maximum(double, 1e-300)[:, None]
+
+
+def crossed(vertices_m: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Return vectors (F, 3) along the normals of triangles (F, 3), twice as long as their areas in m²."""
+    return _crossed(np.ascontiguousarray(vertices_m, float), np.ascontiguousarray(triangles, np.int64))
+
+
+@numba.njit(cache=True)
+def _crossed(vertices, triangles):  # type: ignore[no-untyped-def]
+    cross = np.empty((len(triangles), 3))
+    for f in range(len(triangles)):
+        a, b, c = vertices[triangles[f, 0]], vertices[triangles[f, 1]], vertices[triangles[f, 2]]
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            cross[f, k] = (b[i] - a[i]) * (c[j] - a[j]) - (b[j] - a[j]) * (c[i] - a[i])
+    return cross
 
 
 def uniform_points(
@@ -48,15 +62,27 @@ def even_points(
     area, normals = triangle_areas_and_normals(vertices_m, triangles)
     radius = np.sqrt(area.sum() / (2 * np.sqrt(3) * n))
     pairs = cKDTree(points).query_pairs(2 * radius, output_type="ndarray")
-    normals = normals[triangle]
-    pairs = pairs[np.einsum("ij,ij->i", normals[pairs[:, 0]], normals[pairs[:, 1]]) > 0]
-    distance = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
-    weight = (1 - np.minimum(distance / (2 * radius), 1)) ** _EXPONENT
+    weight = _weights(points, normals[triangle], pairs, 2 * radius)
     one_way = coo_matrix((weight, pairs.T), shape=(len(points), len(points))).tocsr()
     both = (one_way + one_way.T).tocsr()
     both.sort_indices()
     kept = _eliminate(both.indptr.astype(np.int64), both.indices.astype(np.int64), both.data, n)
     return points[kept], triangle[kept]
+
+
+@numba.njit(cache=True)
+def _weights(points, normals, pairs, reach):  # type: ignore[no-untyped-def]
+    """Return how much the points of each pair (P, 2) crowd each other: the nearer the more, not at all on opposite sides."""
+    weights = np.zeros(len(pairs))
+    for p in range(len(pairs)):
+        i, j = pairs[p]
+        cosine, square = 0.0, 0.0
+        for k in range(3):
+            cosine += normals[i, k] * normals[j, k]
+            square += (points[i, k] - points[j, k]) ** 2
+        if cosine > 0:
+            weights[p] = (1 - min(np.sqrt(square) / reach, 1)) ** _EXPONENT
+    return weights
 
 
 @numba.njit(cache=True)
