@@ -64,7 +64,7 @@ def test_fused_surfaces_are_near_the_true_ones_on_both_sides_of_the_wall(metrics
 def test_the_cavity_is_seen_and_its_normals_are_true(metrics):
     assert metrics["fuse.cavity_seen_share_min"] > 0.98
     assert metrics["fuse.seen_normals_within_10_deg_share"] > 0.95
-    assert metrics["fuse.seen_normals_within_10_deg_share_min"] > 0.90
+    assert metrics["fuse.seen_normals_within_10_deg_share_min"] > 0.95
     assert metrics["fuse.normals_flipped_share_max"] < 0.001
 
 
