@@ -70,7 +70,7 @@ def fuse_types() -> dict[Any, str]:
 
     points, rows, views = "f8[:,::1]", "i8[:,::1]", "f4[:,::1], i8[:,::1], f8[:,:,::1]"
     return {
-        planes.inverse_depths: "(Array(float32, 2, 'A', False, aligned=True),)",
+        planes.inverse_depths: "(f4[:,::1],)",
         planes._fitted: f"({points}, {points}, {points}, {points})",
         measuring.signed_distances: f"(i8[::1], f8, b1[:,::1], b1[::1], b1[:,:,::1], {views}, f8)",
         measuring.offsets: f"({points}, {points}, {views}, f8)",

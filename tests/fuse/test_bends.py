@@ -48,6 +48,34 @@ def test_in_a_hollow_corner_a_point_faces_as_the_floor_or_as_the_wall(tray):
     assert np.mean((level > wall) == nearer_floor, where=sure) > 0.95
 
 
+def test_the_sides_of_a_hollow_corner_hold_as_much_as_if_it_were_sharp(tray):
+    """Across: ∮ (x, y, 0)·n/2, and upwards: ∮ (z − level) n_z, over the room's side below a level, n into the room."""
+    table = cloud(*tray, np.ones(len(tray[0]), bool), 12_000, True, np.random.default_rng(1))
+    places, facing, area = points(table) - [0.03, 0.03, 0.005], normals(table), table["area_m2"]
+    level_m, true_m3 = 0.018, 0.05 * 0.05 * 0.018
+    room = (np.abs(places[:, :2]).max(axis=1) < 0.0265) & (places[:, 2] > -0.0015) & (places[:, 2] < level_m)
+    across = -0.5 * np.sum((places * facing)[room, :2] * area[room, None])
+    upwards = np.sum((level_m - places[room, 2]) * facing[room, 2] * area[room])
+    assert across == pytest.approx(true_m3, rel=0.01)
+    assert upwards == pytest.approx(true_m3, rel=0.01)
+
+
+def test_a_fold_does_not_face_away_from_the_sheet():
+    """A sheet that for two cells runs back over itself, and there faces downwards; in the creases it is upright."""
+    n = 30
+    steps = np.ones(n - 1)
+    steps[n // 2 : n // 2 + 2] = -1
+    x, y = np.meshgrid(np.cumsum([0, *steps]), np.arange(n), indexing="ij")
+    z = np.cumsum([0, *(steps < 0) * 0.1])[:, None] + np.zeros_like(x)
+    vertices = CELL_M * np.stack([x, y, z], axis=-1).reshape(-1, 3)
+    corner = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).ravel()
+    halves = [(corner, corner + n, corner + 1), (corner + n, corner + n + 1, corner + 1)]
+    triangles = np.vstack([np.column_stack(half) for half in halves])
+    table = cloud(vertices, triangles, np.ones(len(vertices), bool), 6000, True, np.random.default_rng(3))
+    assert (normals(table)[:, 2] > -0.001).all()
+    assert np.mean(normals(table)[:, 2] > 0.99) > 0.95
+
+
 def test_the_noise_of_a_tube_is_averaged():
     """A torus as thick as a handle, its vertices displaced by 0.4 mm."""
     ring = trimesh.creation.torus(0.03, 0.004, major_sections=150, minor_sections=20)

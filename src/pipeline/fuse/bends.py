@@ -16,6 +16,7 @@ BENT_M = 0.0002  # the mean height of what is around a point above its tangent p
 OFF_PLANE_M, ROUGH = 0.0005, 0.15
 ALIKE = 0.25  # between normals of one side
 FLAT = 0.5  # of the length that the sum of the normals around would have, were all alike: less is a lip, and no normal is wrong
+_STEEPEST = 0.6  # cosine between an arc's normal and that of its side; 0.7 where a right angle was made round
 _SAME_WALL_COSINE = 0.5  # the other side of a thin wall is near, too
 _ROUGH_RINGS, _STEPS = 2, 3
 
@@ -29,12 +30,14 @@ def faced(
     triangles: np.ndarray,
     of_vertices: np.ndarray,
     near: csr_matrix,
-) -> np.ndarray:
-    """Return the unit normals (N, 3) of points (N, 3) in the triangles with `corners` (N, 3).
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the unit normals (N, 3) of points (N, 3) in triangles with these `corners` (N, 3), and what their area counts (N,).
 
     normals (N, 3): where nothing bends. means (N, 3): where it bends outwards. Where it bends inwards, those of a side, by
-    of_vertices (V, 3): unit normals averaged little; near (V, V): 1 at each vertex's neighbours. It is the mode of the normals
-    around: their mean would be neither side's (Fleishman, Cohen-Or & Silva 2005, robust fitting at sharp features).
+    of_vertices (V, 3): unit normals averaged little; near (V, V): 1 at each vertex's neighbours, of which there must be some. It
+    is the mode of the normals around: their mean would be neither side's (Fleishman, Cohen-Or & Silva 2005, robust fitting at
+    sharp features). Such a point is on an arc, whose area counts as 1/cos² of itself, which is what it covers of the side, seen
+    from the arc's centre; elsewhere it counts as 1.
     """
     mean, around = diags(1 / np.diff(near.indptr)) @ near, of_vertices
     for _ in range(_ROUGH_RINGS):
@@ -43,14 +46,17 @@ def faced(
     area, _ = triangle_areas_and_normals(vertices_m, triangles)
     weight = np.bincount(triangles.ravel(), np.repeat(area, 3), len(vertices_m))
     weight *= np.exp(-0.5 * (rough / ROUGH) ** 2)
-    return _faced(
+    found, is_side = _faced(
         points_m, corners, normals, means, vertices_m, of_vertices, weight, near.indptr, near.indices
     )
+    cosine = np.clip(np.einsum("nc,nc->n", found, means), _STEEPEST, 1.0)
+    return found, np.where(is_side, 1.0 / cosine**2, 1.0)
 
 
 @numba.njit(cache=True)
 def _faced(points, corners, normals, means, vertices, of_vertices, weight, start, neighbour):  # type: ignore[no-untyped-def]
-    found, asked_by = normals.copy(), np.full(len(vertices), -1)
+    found, is_side = normals.copy(), np.zeros(len(points), np.bool_)
+    asked_by = np.full(len(vertices), -1)
     around, votes = np.zeros(len(vertices), np.int64), np.zeros(len(vertices))
     for i in range(len(points)):
         count = _gathered(i, points, corners, vertices, start, neighbour, asked_by, around)
@@ -64,8 +70,8 @@ def _faced(points, corners, normals, means, vertices, of_vertices, weight, start
             for a in range(count):
                 votes[a] = _vote(points[i], normals[i], vertices, of_vertices, weight, near[a])
             if votes[:count].sum() > 0:
-                found[i] = _mode(near, votes[:count], of_vertices)
-    return found
+                found[i], is_side[i] = _mode(near, votes[:count], of_vertices), True
+    return found, is_side
 
 
 @numba.njit(cache=True)

@@ -20,7 +20,8 @@ def cloud(
 ) -> Columns:
     """Return n points as table `cloud`: normals averaged with their like around where fused, `seen` from the vertices'.
 
-    A point's area is that of its share of the surface, projected along its normal: what the noise roughens by adds none.
+    A point's area is that of its share of the surface, projected along the normals around: what the noise roughens by adds none.
+    In a corner that was made round it is that of the sides.
     """
     points, triangle = even_points(vertices_m, triangles, n, rng)
     around = triangles[triangle]
@@ -29,13 +30,16 @@ def cloud(
     of_vertices = vertex_normals(vertices_m, triangles, int(fused))
     near = neighbours(triangles, len(vertices_m))
     normals = _interpolated(sharpened(of_vertices, near) if fused else of_vertices, around, weights)
-    projected = np.clip(np.einsum("nc,nc->n", normals, facets[triangle]), 0.0, 1.0)
+    share = np.clip(np.einsum("nc,nc->n", normals, facets[triangle]), 0.0, 1.0)
     if fused:
         means = _interpolated(vertex_normals(vertices_m, triangles, _BENT_ROUNDS), around, weights)
-        normals = bends.faced(points, around, normals, means, vertices_m, triangles, of_vertices, near)
+        normals, stands_for = bends.faced(
+            points, around, normals, means, vertices_m, triangles, of_vertices, near
+        )
+        share *= stands_for
     return {
         **dict(zip(("x_m", "y_m", "z_m", "nx", "ny", "nz"), np.hstack([points, normals]).T, strict=True)),
-        "area_m2": area.sum() / n * projected,
+        "area_m2": area.sum() / n * share,
         "seen": (seen[around] * weights[..., 0]).sum(axis=1) > 0.5,
     }
 

@@ -9,8 +9,8 @@ import numpy as np
 
 LEAST_FREE = 2  # views that see a voxel free, far from every surface: enough to believe it
 SURELY_FREE = 12  # views that see past, and none before them that sees a surface: the others are not asked
-# Blocks of so many voxels a side, and what they are: see `_blocks`.
-BLOCK = 4
+# Blocks of so many voxels a side are asked once, and what they are: see `_blocks`; only the free and the unseen are acted on.
+TOGETHER = 4
 SURFACE, FREE, UNSEEN, NEITHER = 0, 1, 2, 3
 # A view that sees past a voxel counts less than one that sees the surface near it: at a lip, where half of the views see past,
 # the mean is then zero in walls of some millimetres.
@@ -29,8 +29,8 @@ def signed_distances(lowest, voxel, columns, layers, near, plane, view, projecti
     """Return signed distances (nx, ny, nz) in truncations, positive in the open, and how many views told.
 
     lowest (3,): coordinates of the first voxel. columns (nx, ny), layers (nz,): where to look at all. near (nx, ny,
-    nz): where a surface may be; elsewhere two views that see past are enough, and amid blocks that are all free or all
-    unseen no view is asked. The arrays of `Planes`; truncation in metres.
+    nz): where a surface may be; elsewhere two views that see past are enough, and amid blocks whose middles are
+    all free or all unseen no view is asked. The arrays of `Planes`; truncation in metres.
     """
     nx, ny, nz = near.shape
     amid = _amid(_blocks(lowest, voxel, near, plane, view, projection, truncation))
@@ -43,7 +43,7 @@ def signed_distances(lowest, voxel, columns, layers, near, plane, view, projecti
             x, y = (lowest[0] + ix) * voxel, (lowest[1] + iy) * voxel
             _project(x, y, projection, column)
             for iz in range(nz):
-                block = amid[ix // BLOCK, iy // BLOCK, iz // BLOCK]
+                block = amid[ix // TOGETHER, iy // TOGETHER, iz // TOGETHER]
                 if not layers[iz] or block == UNSEEN:
                     continue
                 if block == FREE:
@@ -61,17 +61,17 @@ def signed_distances(lowest, voxel, columns, layers, near, plane, view, projecti
 @numba.njit(cache=True)
 def _blocks(lowest, voxel, near, plane, view, projection, truncation):  # type: ignore[no-untyped-def]
     """Return of each block of voxels what its middle is: free, unseen, or neither; or that a surface may be in it."""
-    shape = [-(-n // BLOCK) for n in near.shape]
+    shape = [-(-n // TOGETHER) for n in near.shape]
     found = np.full((shape[0], shape[1], shape[2]), SURFACE, np.int8)
     seen, column = np.zeros((len(view), 5)), np.zeros((len(view), 3))
-    middle = (BLOCK - 1) / 2
+    middle = (TOGETHER - 1) / 2
     for bx in range(shape[0]):
         for by in range(shape[1]):
-            x, y = (lowest[0] + bx * BLOCK + middle) * voxel, (lowest[1] + by * BLOCK + middle) * voxel
+            x, y = (lowest[0] + bx * TOGETHER + middle) * voxel, (lowest[1] + by * TOGETHER + middle) * voxel
             _project(x, y, projection, column)
             for bz in range(shape[2]):
-                i, j, k = bx * BLOCK, by * BLOCK, bz * BLOCK
-                if near[i : i + BLOCK, j : j + BLOCK, k : k + BLOCK].any():
+                i, j, k = bx * TOGETHER, by * TOGETHER, bz * TOGETHER
+                if near[i : i + TOGETHER, j : j + TOGETHER, k : k + TOGETHER].any():
                     continue
                 z = (lowest[2] + k + middle) * voxel
                 count, free = _observed(
@@ -83,7 +83,7 @@ def _blocks(lowest, voxel, near, plane, view, projection, truncation):  # type: 
 
 @numba.njit(cache=True)
 def _amid(blocks):  # type: ignore[no-untyped-def]
-    """Return the blocks with those that border on another kind, but for surfaces, as `NEITHER`."""
+    """Return the blocks with those as `NEITHER` that border on another kind; a surface beside them does not count."""
     found = blocks.copy()
     nx, ny, nz = blocks.shape
     for i in range(nx):

@@ -30,7 +30,7 @@ OTHERS = 12  # views that are asked whether they look through a point
 # What is nearer together is one thing; in a single view its own shadow lies between its parts.
 GAP_M, SHADOW_M = 0.016, 0.12
 AROUND_M = 0.15  # the table is fitted again this far around the object: depth cameras bend large planes
-_ASKED = 300_000  # points speak for all of them
+_ASKED = 300_000  # points at most tell heights, noise, and what is below the table: every so many
 _HITS_OF_NOISE = 3  # stray pixels hit a cell once or twice; a cell of the object is hit by many views
 
 

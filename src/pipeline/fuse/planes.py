@@ -43,7 +43,7 @@ def planes(views: Views, placement: Placement) -> Planes:
     for depth_m, K, T_object_camera in zip(views.depths_m, views.intrinsics, poses, strict=True):
         low, high = _window(corners, K, T_object_camera, depth_m.shape)
         K = K - [[0, 0, low[0]], [0, 0, low[1]], [0, 0, 0]]
-        depth_m = depth_m[low[1] : high[1], low[0] : high[0]]
+        depth_m = np.ascontiguousarray(depth_m[low[1] : high[1], low[0] : high[0]])
         parts.append(_fitted(inverse_depths(depth_m), K, T_object_camera, placement.bounds_m))
         windows.append((start, *(high - low)))
         projections.append(K @ frames.inverse(T_object_camera)[:3])

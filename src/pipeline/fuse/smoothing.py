@@ -48,7 +48,7 @@ def _of_corners(triangles, values):  # type: ignore[no-untyped-def]
 
 
 def sharpened(normals: np.ndarray, near: csr_matrix) -> np.ndarray:
-    """Return unit normals (V, 3) averaged with those neighbours' that are much alike; near (V, V): 1 at neighbours."""
+    """Return unit normals (V, 3) averaged with like neighbours'; near (V, V): 1 at neighbours of a closed mesh."""
     for _ in range(SHARPENINGS):
         normals = _alike(near.indptr, near.indices, normals, ALIKE)
     return normals

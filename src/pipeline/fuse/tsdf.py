@@ -14,7 +14,7 @@ from pipeline.fuse.table import Placement
 from pipeline.fuse.walls import parted
 from pipeline.fuse.wrapping import Field
 
-BLOCK = 8
+BLOCK = 8  # voxels; the box is whole blocks: a margin, and what Open3D's grid in benchmarks/fusion.py takes
 # The table's own surface, fused, stays below this height: what is lower counts as table.
 TABLE_M = 0.0006
 # Beyond the sensor's noise a longer truncation only makes floor and walls speak of each other (docs/fusion.md).
