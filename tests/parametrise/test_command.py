@@ -3,6 +3,7 @@
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 from conftest import sampled
 
@@ -47,3 +48,19 @@ def test_a_typo_is_refused_in_one_sentence_and_nothing_is_written(mapping, tmp_p
     assert told.stderr.startswith("error: parameter 'radus_m' is unknown")
     assert told.stderr.count("\n") == 1
     assert not path.exists()
+
+
+def test_an_object_whose_wall_shows_one_side_has_every_parameter_but_that(mapping, tmp_path):
+    table = read_table(mapping, "mapping")
+    inward = -(table[["x_m", "y_m"]] - table[["x_m", "y_m"]].mean())
+    table[["nx", "ny", "nz"]] = 0.0
+    table[["nx", "ny"]] = (inward.T / np.hypot(*inward.to_numpy().T)).T.to_numpy()
+    one_sided, path = tmp_path / "mapping.parquet", tmp_path / "parameters.parquet"
+    write_table(one_sided, table, "mapping")
+    written = ["--parameters", str(path), "--tilt-references", str(tmp_path / "tilts.parquet")]
+    told = _call("pipeline.parametrise", one_sided, "--hull-points", "500", *written)
+    assert told.returncode == 0, told.stderr
+    assert told.stderr == ""
+    found = read_table(path, "parameters").set_index("mapping")
+    assert found["wall_m"].isna().all()
+    assert found.drop(columns="wall_m").notna().all(axis=None)

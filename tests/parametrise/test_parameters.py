@@ -9,6 +9,7 @@ from parametrise.clouds import cloud
 from pipeline.artefacts import read_table, write_table
 from pipeline.errors import PipelineError
 from pipeline.geometry.cavity import TIE_M, cavity, pour_axis, retained_volume_m3
+from pipeline.geometry.frames import rotation_about
 from pipeline.parametrise.cloud import PIECES, evened
 from pipeline.parametrise.inside import GRID_DEG
 from pipeline.parametrise.library import parameter
@@ -101,6 +102,37 @@ def test_the_lip_of_a_jug_is_its_spout():
     heights = body.lip_edge_m[:, 2]
     assert values["spout_depth_m"] == pytest.approx(np.median(heights) - heights.min(), abs=1e-3)
     assert found(["spout_depth_m"], "tall_cup")["spout_depth_m"] < 0.001
+
+
+@pytest.mark.parametrize("points", [24, 45, 90, 180, 360, 400, 720])
+def test_what_is_read_off_a_regular_rim_turns_with_it(points):
+    names = ["contour_m", "opening_m", "radius_m", "spout_depth_m"]
+    azimuth = np.arange(points) * 2 * np.pi / points
+    rim_m = np.column_stack([0.04 * np.cos(azimuth), 0.04 * np.sin(azimuth), np.full(points, 0.1)])
+    here = evaluate(names, {"rim_m": rim_m})
+    assert here["spout_depth_m"] == pytest.approx(0.0, abs=1e-9)
+    for yaw_deg in (1.0, 7.3, 45.0, 90.0, 123.4, 200.0, 359.0):
+        R = rotation_about(np.array([0.0, 0.0, 1.0]), np.radians(yaw_deg))
+        there = evaluate(names, {"rim_m": rim_m @ R.T})
+        for name in names[:2]:
+            np.testing.assert_allclose(there[name], here[name] @ R.T, atol=1e-9, err_msg=f"{name} {yaw_deg}")
+        for name in names[2:]:
+            assert there[name] == pytest.approx(here[name], abs=1e-9), (name, yaw_deg)
+
+
+def test_a_wall_of_which_one_side_is_seen_or_no_two_points_are_opposite_has_no_thickness():
+    pieces = cloud("short_cup").pieces(HULL_POINTS)
+    container_m, inner = pieces["container_m"], evaluate(["inner", "opening_m"], pieces)["inner"]
+    assert inner.any()
+    assert not inner.all()
+    up = np.tile([0.0, 0.0, 1.0], (len(inner), 1))
+    for normals, sides in (
+        (pieces["container_normals"], np.ones_like(inner)),
+        (pieces["container_normals"], np.zeros_like(inner)),
+        (up, inner),
+    ):
+        given = {"container_m": container_m, "container_normals": normals, "inner": sides}
+        assert np.isnan(evaluate(["wall_m"], given)["wall_m"])
 
 
 @pytest.mark.parametrize("points", [4000, 6000, 12000])

@@ -102,3 +102,9 @@ def test_the_table_has_value_uncertainty_and_the_known_error():
     assert cells[(1, -1)] == "radius, mm"
     assert cells[(1, 0)] == f"{own['value'] * 1e3:.2f} ± {own['std'] * 1e3:.2f} (−1.2 %)"
     assert cells[(2, -1)] == "retained 0°, ml"
+
+
+def test_a_parameter_that_could_not_be_told_is_a_dash():
+    listed = _listed(["wall_m"]).assign(value=np.nan, std=np.nan)
+    (page, _) = table(listed, {"jug": {"parametrise.label_mapping.radius": 0.01}})
+    assert page.axes[0].tables[0][1, 0].get_text().get_text() == "–"

@@ -1,10 +1,18 @@
 """The comparison of warping methods: its numbers, what counts as a bar reached, and that gaps are shown as gaps."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from conftest import PARTS, sampled
 
+from pipeline.artefacts import read_table, write_json, write_table
+from pipeline.report import warping
+from pipeline.report.accuracy import parameter_errors, read_truth
 from pipeline.report.warping import numbers
 from pipeline.report.warping_page import COLUMNS, MEASURES, bars_met, matrices, over_targets, overview
+from pipeline.scan import truth
+from pipeline.scan.shapes import shape
 
 ASKED = [key for key, measure in MEASURES.items() if measure.bar is not None]
 
@@ -69,3 +77,48 @@ def test_the_matrices_stand_in_even_rows():
     figure.canvas.draw()
     first, second, third = (figure.axes[row * COLUMNS].get_position() for row in range(3))
     assert second.y0 - third.y1 == pytest.approx(first.y0 - second.y1, abs=0.01)
+
+
+def compared(processed: Path, **changed: float) -> dict[str, float]:
+    """Return the scores of a warp whose labels and parameters are a cup's true ones, but for those named."""
+    body, table = shape("short_cup"), sampled("short_cup")
+    warp = processed / "warp/mug/by/some_k1/short_cup"
+    rows = range(len(table))
+    names = ["x_m", "y_m", "z_m", "nx", "ny", "nz", "area_m2", *PARTS]
+    mapped = table[names].assign(source_index=rows, target_index=rows, valid=True)
+    own = {"residual_m": 0.001, "share_without_candidate": 0.0, "wall_side_flips": 0.0}
+    opening_m, lip_m = body.lip_edge_m.mean(axis=0), body.lip_edge_m[0]
+    row = {
+        "radius_m": np.linalg.norm(lip_m - opening_m),
+        **{"volume_m3": body.hull_volume_m3, "height_m": body.height_m, "capacity_m3": body.capacity_m3},
+        **{"wall_m": body.wall_m, "tilt_reference_rad": 0.8, "tilt_reference_cavity_rad": 0.8},
+        **{f"opening_{axis}_m": value for axis, value in zip("xyz", opening_m, strict=True)},
+        **{f"lip_{axis}_m": value for axis, value in zip("xyz", lip_m, strict=True)},
+        **{f"centre_{axis}_m": 0.0 for axis in "xyz"},
+    } | changed
+    columns = {"object": ["short_cup"], "mapping": ["label_mapping"]} | {
+        key: [value] for key, value in row.items()
+    }
+    truth.write(processed / "scan/short_cup", body, np.eye(4), np.random.default_rng(1))
+    write_json(processed / "fuse/short_cup/fusion.json", {"T_object_world": np.eye(4).tolist()})
+    write_json(warp / "alignment.json", {"label_mapping": own, "wall_side_flips_without_check": 0.4})
+    write_json(warp / "cpu.json", {"fit_s": 1.0})
+    write_table(warp / "label_mapping.parquet", mapped, "mapping")
+    write_table(processed / "parametrise/mug/by/some_k1/short_cup.parquet", columns, "parameters")
+    return warping.scores(processed, "mug", "short_cup", "some_k1", read_truth(processed, "short_cup"))
+
+
+def test_a_wall_that_could_not_be_told_costs_no_other_error(tmp_path):
+    found = compared(tmp_path, wall_m=np.nan)
+    row = read_table(tmp_path / "parametrise/mug/by/some_k1/short_cup.parquet", "parameters").iloc[0]
+    errors = parameter_errors(row, read_truth(tmp_path, "short_cup"))
+    assert "wall" not in errors
+    assert np.isfinite(list(errors.values())).all()
+    assert all(np.isfinite(found[key]) for key in warping.PARAMETERS)
+    assert found == pytest.approx(compared(tmp_path), nan_ok=True)
+
+
+def test_a_mapping_without_a_container_or_a_rim_has_no_errors_of_parameters(tmp_path):
+    found = compared(tmp_path, **dict.fromkeys(("radius_m", "volume_m3", "capacity_m3"), np.nan))
+    assert all(np.isnan(found[key]) for key in warping.PARAMETERS)
+    assert found["rim_iou"] > 0.9

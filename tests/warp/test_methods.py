@@ -17,7 +17,7 @@ from pipeline.warp.quality import quality
 from pipeline.warp.shape_space import example
 from pipeline.warp.warp import Warp
 
-POINTS = 2000
+POINTS, DENSE = 2000, 6000
 SCHEMA = Path(__file__).parents[2] / "workflow/schemas/config.schema.yaml"
 
 every_method = pytest.mark.parametrize("method", sorted(METHODS))
@@ -32,14 +32,15 @@ OTHERS = ("small_cup", "tumbler", "jug", "wide_bowl")
 
 
 @cache
-def examples() -> list[np.ndarray]:
-    """Return the mug's points on objects that are no target here."""
-    warps = [nearest_neighbour.fit(body("mug"), body(name), rng=np.random.default_rng(0)) for name in OTHERS]
-    return [example(body("mug"), warp.deformation, warp.source_frame, warp.target_frame) for warp in warps]
+def examples(name: str) -> list[np.ndarray]:
+    """Return a source's points on objects that are no target here."""
+    source = body(name)
+    warps = [nearest_neighbour.fit(source, body(other), rng=np.random.default_rng(0)) for other in OTHERS]
+    return [example(source, warp.deformation, warp.source_frame, warp.target_frame) for warp in warps]
 
 
 def fit(method: str, source: Cloud, target: Cloud, seed: int = 5) -> Warp:
-    own = {"examples": examples()} if method == "shape_space" else {}
+    own = {"examples": examples(source.name)} if method == "shape_space" else {}
     return METHODS[method](source, target, rng=np.random.default_rng(seed), **own)
 
 
@@ -135,6 +136,32 @@ def test_labels_arrive_and_no_wall_is_crossed(method, target):
 
 
 @every_method
+@pytest.mark.parametrize("target", ["square_bowl", "wide_bowl", "mug"])
+def test_a_source_without_a_handle_gives_none_and_leaves_out_nothing_but_a_targets(method, target):
+    warp = fit(method, body("tall_cup"), cloud(target, DENSE))
+    assert warp.valid.mean() > 0.99
+    found, true = warp.map_labels(1).cloud.parts, warp.target.parts
+    assert not found[:, 2].any()
+    if target == "mug":
+        assert warp.is_known[~true[:, 2]].mean() > 0.99
+        assert not warp.is_known[true[:, 2]].all()
+    if method != "rigid":
+        assert iou(found[:, 1], true[:, 1]) > 0.45
+
+
+@pytest.mark.parametrize(("target", "points"), [("wide_bowl", 1500), ("square_bowl", 1500), ("jug", 1000)])
+def test_pairs_are_found_in_clouds_too_thin_for_a_rim(target, points):
+    whole = cloud(target, DENSE)
+    thin, from_rows, to_rows = nearest_neighbour.pairs(
+        nearest_neighbour.coarse(body("tall_cup"), whole), points
+    )
+    assert len(thin.target.points_m) == points
+    with pytest.raises(PipelineError, match="expected a rim around an opening"):
+        nearest_neighbour.coarse(body("tall_cup"), thin.target)
+    assert len(from_rows) == len(to_rows) > points
+
+
+@every_method
 def test_the_source_itself_gets_its_labels_back_wherever_it_stands(method):
     source = body("mug")
     target = moved(source, 2.3, 1.0, (0.1, -0.3, 0.0))
@@ -156,6 +183,7 @@ def test_a_warp_is_what_it_was_after_saving(method, tmp_path):
     files.save(tmp_path / "warp.npz", warp)
     loaded = files.load(tmp_path / "warp.npz", warp.source, warp.target)
     assert (loaded.method, loaded.diagnostics) == (warp.method, warp.diagnostics)
+    assert loaded.target_frame.rim_low_m == warp.target_frame.rim_low_m
     assert loaded.target_frame.roll_observable is warp.target_frame.roll_observable
     np.testing.assert_array_equal(loaded.aligned.points_m, warp.aligned.points_m)
     np.testing.assert_array_equal(loaded.map_labels(3).cloud.parts, warp.map_labels(3).cloud.parts)

@@ -120,7 +120,8 @@ def draw_training_set(
     raise PipelineError(f"{name}: {MAX_REDRAWS} training sets of {samples} trials had one outcome only")
 
 
-@config_context(skip_parameter_validation=True)  # of thousands of small fits
+# Thousands of small fits: scikit-learn would check its parameters each time.
+@config_context(skip_parameter_validation=True)
 def evaluate(
     trials: pd.DataFrame,
     labels: np.ndarray,

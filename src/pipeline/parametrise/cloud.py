@@ -63,7 +63,8 @@ def warped(table: Frame, *, name: str) -> Cloud:
     even_m = points_m.copy()
     outside = container.copy()
     outside[container] = _outward(points_m[container], directions[container])
-    even_m[outside] = evened(points_m[outside], directions[outside])
+    if outside.any():
+        even_m[outside] = evened(points_m[outside], directions[outside])
     return Cloud(points_m, directions, area_m2, container, rim, even_m)
 
 

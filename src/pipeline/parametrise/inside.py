@@ -70,11 +70,17 @@ def tilt_reference_cavity_rad(kept_m3: np.ndarray) -> float:
 
 @parameter("m")
 def wall_m(container_m: np.ndarray, container_normals: np.ndarray, inner: np.ndarray) -> float:
-    """Thickness of the wall: median over the inner side of |(q - p)·n|, q the nearest point that faces the other way."""
+    """Thickness of the wall: median over the inner side of |(q - p)·n|, q the nearest that faces the other way.
+
+    nan where no point has another one opposite: a cloud of one side, torn labels.
+    """
     from scipy.spatial import cKDTree
 
+    if not inner.any() or inner.all():
+        return float("nan")
     p, n = container_m[inner], container_normals[inner]
     q, n_other = container_m[~inner], container_normals[~inner]
     nearest = cKDTree(q).query(p)[1]
-    wall = np.einsum("nc,nc->n", n, n_other[nearest]) < _OPPOSITE
-    return float(np.median(np.abs(np.einsum("nc,nc->n", q[nearest] - p, n))[wall]))
+    opposite = np.einsum("nc,nc->n", n, n_other[nearest]) < _OPPOSITE
+    apart_m = np.abs(np.einsum("nc,nc->n", q[nearest] - p, n))[opposite]
+    return float(np.median(apart_m)) if len(apart_m) else float("nan")

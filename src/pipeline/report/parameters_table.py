@@ -85,6 +85,8 @@ def _title(name: str, unit: str) -> str:
 
 
 def _cell(row: pd.Series, name: str, errors: Mapping[str, float], mapping: str) -> str:
+    if pd.isna(row["value"]):
+        return "–"
     factor, _, decimals = SHOWN.get(row["unit"], (1.0, row["unit"], 3))
     text = f"{row['value'] * factor:z.{decimals}f} ± {row['std'] * factor:.{decimals}f}".replace("-", "−")
     key, unit = ERRORS.get(name, ("", ""))

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from pipeline.report.warping_page import Scores
 
 PARAMETERS = ("radius", "opening_mm", "height", "hull_volume", "capacity", "tilt_reference_deg")
+NEEDED = ["radius_m", "volume_m3", "capacity_m3"]  # without these a mapping had no container or rim
 
 
 def main() -> None:
@@ -53,9 +54,7 @@ def scores(processed: Path, source: str, target: str, by: str, truth: "Truth") -
     labels = label_scores(mapped, true_parts(mapped, truth))
     table = read_table(processed / "parametrise" / source / "by" / by / f"{target}.parquet", "parameters")
     row = table.set_index("mapping").loc["label_mapping"]
-    errors = {}
-    if not row.isna().any():
-        errors = parameter_errors(row, truth)
+    errors = {} if row[NEEDED].isna().any() else parameter_errors(row, truth)
     own = alignment["label_mapping"]
     return {
         "residual_mm": 1e3 * own["residual_m"],

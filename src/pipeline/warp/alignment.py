@@ -8,7 +8,7 @@ from pipeline.errors import PipelineError
 from pipeline.geometry import frames
 from pipeline.warp.clouds import Cloud
 from pipeline.warp.components import components
-from pipeline.warp.roll import roll
+from pipeline.warp.roll import rim_low_m, roll
 
 UPRIGHT_MAX_RAD = np.radians(30.0)
 RING_COVERAGE_BINS = 36
@@ -19,13 +19,15 @@ class PartFrame:
     """An object's part frame: origin at the mean of the container, first axis to the rim, second to the handle.
 
     `T_object_part` is 4×4, metres. `spread_m` (3,) is the standard deviation of the container along its axes. How many second
-    axes are equally right is `roll_symmetry`, 0 where all are; how many handles were seen, `handles`.
+    axes are equally right is `roll_symmetry`, 0 where all are; how many handles were seen, `handles`; how high the rim begins,
+    object frame, `rim_low_m`.
     """
 
     T_object_part: np.ndarray
     spread_m: np.ndarray
     roll_symmetry: int
     handles: int
+    rim_low_m: float
 
     @property
     def roll_observable(self) -> bool:
@@ -44,14 +46,15 @@ def part_frame(cloud: Cloud) -> PartFrame:
             f"{cloud.name}: expected a container, but only {len(container_m)} of its points look like one; look at the scan"
         )
     origin_m = container_m.mean(axis=0)
-    ring_m = rim_ring(cloud)
+    ring_m = _rim_ring(cloud)
     first = _first_axis(ring_m.mean(axis=0) - origin_m, name=cloud.name)
     turned = roll(cloud, origin_m, ring_m)
     second = turned.axis - first * (turned.axis @ first)
     second = second / np.linalg.norm(second)
     rotation = np.column_stack([first, second, np.cross(first, second)])
     spread_m = ((container_m - origin_m) @ rotation).std(axis=0)
-    return PartFrame(frames.transform(rotation, origin_m), spread_m, turned.symmetry, turned.handles)
+    T_object_part = frames.transform(rotation, origin_m)
+    return PartFrame(T_object_part, spread_m, turned.symmetry, turned.handles, rim_low_m(ring_m))
 
 
 def scale(source: PartFrame, target: PartFrame) -> np.ndarray:
@@ -72,7 +75,7 @@ def _first_axis(to_rim: np.ndarray, *, name: str) -> np.ndarray:
     return np.array([0.0, 0.0, 1.0])
 
 
-def rim_ring(cloud: Cloud) -> np.ndarray:
+def _rim_ring(cloud: Cloud) -> np.ndarray:
     """Return the points (M, 3) of the candidate ring that goes round most of an opening that is open.
 
     Edges of a base look like rims to local features; but across a base there is a surface.

@@ -15,7 +15,7 @@ from pipeline.warp.shape_space import example
 from pipeline.warp.stretch import Stretch
 from pipeline.warp.warp import Warp
 
-FRAME = ("T_object_part", "spread_m", "roll_symmetry", "handles")
+FRAME = ("T_object_part", "spread_m", "roll_symmetry", "handles", "rim_low_m")
 KERNELS = ("affine", "offset_m", "centres_m", "weights", "width_m")
 STRETCH = ("knots_m", "scale", "offset_m")
 

@@ -10,7 +10,7 @@ from pipeline.warp.components import components
 
 HANDLE_MIN_SHARE = 0.02
 # Shares of a handle's points that are labelled so, and that face the body from outside; how far off it, of the body's radius.
-LOOKS, FACES_BODY, GAP = 0.3, 0.05, 0.05
+LEAST_LABELLED, FACES_BODY, GAP = 0.3, 0.05, 0.05
 WAY = np.linspace(0.15, 0.9, 26)  # shares of the way from a handle to the axis; its own wall comes before
 ALIKE = 0.8  # a second handle counts as large as the first from here on
 SECTORS, ROUND_SHARE, REPEATS = 72, 0.015, 0.9
@@ -64,8 +64,8 @@ def _horizontal(vector: np.ndarray) -> np.ndarray:
 def _handles(cloud: Cloud, origin_m: np.ndarray, ring_m: np.ndarray) -> list[np.ndarray]:
     """Return the rows of each handle, that with most points first.
 
-    A candidate stands off the body, and looks like a handle in part. A spout may, too: it reaches the rim, and nothing of it
-    faces the body from outside.
+    A candidate stands off the body, and looks like a handle in part. A spout may do both; but it reaches the rim, and
+    nothing of it faces the body from outside.
     """
     if not cloud.parts[:, 2].any():
         return []
@@ -74,7 +74,7 @@ def _handles(cloud: Cloud, origin_m: np.ndarray, ring_m: np.ndarray) -> list[np.
     found = []
     for rows in components(cloud, off):
         alike = rows[cloud.parts[rows, 2]]
-        if len(rows) < HANDLE_MIN_SHARE * len(off) or len(alike) < LOOKS * len(rows):
+        if len(rows) < HANDLE_MIN_SHARE * len(off) or len(alike) < LEAST_LABELLED * len(rows):
             continue
         loops = np.mean(_outside_wall(cloud, rows, origin_m, outward)) > FACES_BODY
         below = np.mean(cloud.points_m[rows, 2] >= low_m) < FACES_BODY

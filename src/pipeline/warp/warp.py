@@ -6,11 +6,11 @@ from functools import cached_property
 import numpy as np
 
 from pipeline.geometry import frames
-from pipeline.warp.alignment import PartFrame, rim_ring
+from pipeline.warp.alignment import PartFrame
 from pipeline.warp.clouds import Cloud, Mapped, subset
 from pipeline.warp.deformation import Deformation
 from pipeline.warp.nearest import agreeing_neighbours, majority_of_neighbours, mean_of_neighbours
-from pipeline.warp.roll import rim_low_m, standing_off
+from pipeline.warp.roll import standing_off
 
 FAR = 0.1  # further than this, in spreads of the container, a pair is no pair
 
@@ -64,7 +64,7 @@ class Warp:
         off, _ = standing_off(self.target, self.target_frame.T_object_part[:3, 3])
         spread_m = np.linalg.norm(self.target_frame.spread_m)
         far = label_pairs(self, 1)[1][:, 0] > FAR * spread_m
-        rim = self.target.parts[:, 1] & (self.target.points_m[:, 2] >= rim_low_m(rim_ring(self.target)))
+        rim = self.target.parts[:, 1] & (self.target.points_m[:, 2] >= self.target_frame.rim_low_m)
         return ~(off & far & ~rim)
 
     @property
