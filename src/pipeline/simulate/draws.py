@@ -130,7 +130,7 @@ def draw_filling(
     T_world_approach = _placed(R, held.opening_m, second.opening_m + approach)
     lip = lip_towards(held, T_world_approach, second.opening_m)
     axis = R @ pour_axis(held.opening_m, lip)
-    along = np.array([axis[1], -axis[0], 0.0])
+    along = ahead(axis)
     lip_world = second.opening_m + dx * along + dy * axis + dz * np.array([0.0, 0.0, 1.0])
     T_world_held = _placed(R, lip, lip_world)
     return FillingDraw(
@@ -147,6 +147,11 @@ def _second_fill(
         return "relative", share * whole_m3
     free_m3 = share * protocol.free_room_max_particles * particle_m3
     return "free_room", max(0.0, second.capacity_m3 - free_m3)
+
+
+def ahead(axis_world: np.ndarray) -> np.ndarray:
+    """Return where a cup pours to (3,) that is tilted about a horizontal axis (3,): axis × up."""
+    return np.array([axis_world[1], -axis_world[0], 0.0])
 
 
 def _placed(R: np.ndarray, point: np.ndarray, point_world: np.ndarray) -> np.ndarray:

@@ -173,7 +173,7 @@ def filling_margin(
     room that would be left, in capacities. What the held cup keeps, from half a particle on, counts against both.
     """
     held_m3, capacity_m3 = protocol.held_particles * held.particle_m3, second.cavity.capacity_m3
-    along = np.cross(draw.axis_world, [0.0, 0.0, 1.0])
+    along = draws.ahead(draw.axis_world)
     landing = draw.lip_world + throw_m(held.depth_m, draw.dz_m, protocol.tilt_rad) * along
     rim_world = frames.apply(draw.T_world_second, second.cavity.rim_m)
     inside = inside_m(rim_world[:, :2], landing[:2]) / second.cavity.opening_radius_m
