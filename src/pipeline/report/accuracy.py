@@ -216,13 +216,16 @@ def _balanced_accuracy(found: np.ndarray, true: np.ndarray) -> float:
 def parameter_errors(row: pd.Series, truth: Truth) -> dict[str, float]:
     """Return relative errors of the scalars, the opening's error (mm) and those of the tilt references (degrees).
 
-    `row` is of table `parameters`; a wall that it could not tell is left out. The tilt reference's truth is the same
+    `row` is of table `parameters`; a scalar that it could not tell is left out. The tilt reference's truth is the same
     functional of the true hull, at the true rim point nearest to the warped lip; that on the cavity is what hydrostatics
     says there.
     """
     true_value = {**truth.facts, "volume_m3": truth.facts["hull_volume_m3"]}
-    told = {name: key for name, key in SCALARS.items() if key != "wall_m" or np.isfinite(row[key])}
-    errors = {name: float(row[key] / true_value[key] - 1.0) for name, key in told.items()}
+    errors = {
+        name: float(row[key] / true_value[key] - 1.0)
+        for name, key in SCALARS.items()
+        if np.isfinite(row[key])
+    }
     rim_m = points(truth.cloud[truth.cloud["rim"]])
     opening_m = rim_m.mean(axis=0)
     found_m, lip_m = (

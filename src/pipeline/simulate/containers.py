@@ -37,7 +37,6 @@ class Containers:
     def __init__(self) -> None:
         self._client = pybullet.connect(pybullet.DIRECT)
         self._hull_m: dict[int, np.ndarray] = {}
-        self._pose: dict[int, np.ndarray] = {}
         self._scouts: dict[int, list[int]] = {}
 
     def __enter__(self) -> "Containers":
@@ -72,15 +71,11 @@ class Containers:
         return pybullet.createMultiBody(1.0, shape, physicsClientId=self._client)
 
     def move(self, body: int, T_world_body: np.ndarray) -> None:
-        """Put a body at a pose (4, 4), unless it is there."""
-        before = self._pose.get(body)
-        if before is None or not np.array_equal(before, T_world_body):
-            bodies.place(body, T_world_body, self._client)
-            self._pose[body] = T_world_body.copy()
+        """Put a body at a pose (4, 4)."""
+        bodies.place(body, T_world_body, self._client)
 
     def _put(self, body: int, at_m: Sequence[float], turned: Sequence[float]) -> None:
         """Put a body at a place (3,) and a quaternion (4,)."""
-        self._pose.pop(body, None)
         pybullet.resetBasePositionAndOrientation(body, at_m, turned, physicsClientId=self._client)
 
     def gap_m(self, held: int, second: int, look_ahead_m: float = 0.02) -> float:
