@@ -62,4 +62,4 @@ def test_trials_call_what_was_compiled_and_nothing_else() -> None:
 def test_it_tells_what_it_compiled(tmp_path) -> None:
     command = [sys.executable, "-m", "pipeline.compile", "fuse", "--compiled", str(tmp_path / "fuse.json")]
     subprocess.run(command, check=True)
-    assert "pipeline.fuse.planes._fitted" in read_json(tmp_path / "fuse.json")["functions"]
+    assert "pipeline.fuse.planes._fit_all" in read_json(tmp_path / "fuse.json")["functions"]

@@ -1,6 +1,7 @@
 """What every stage's `python -m pipeline.<stage>` shares: options, errors as one sentence, progress lines."""
 
 import argparse
+import gc
 import os
 import signal
 import sys
@@ -28,6 +29,8 @@ def run(main: Callable[[], None]) -> None:
 
     Ctrl-C ends it by its signal, without a word.
     """
+    # What libraries make as they load is no garbage, and there is much of it: it is looked through seldom, and not at the end.
+    gc.set_threshold(50_000)
     try:
         main()
     except PipelineError as error:
@@ -37,6 +40,8 @@ def run(main: Callable[[], None]) -> None:
         # Ended by the signal, not by a number: a shell's loop about it ends, too.
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         os.kill(os.getpid(), signal.SIGINT)
+    finally:
+        gc.freeze()
 
 
 def say(message: str) -> None:

@@ -71,8 +71,8 @@ def fuse_types() -> dict[Any, str]:
     points, rows, views = "f8[:,::1]", "i8[:,::1]", "f4[:,::1], i8[:,::1], f8[:,:,::1]"
     return {
         planes.inverse_depths: "(f4[:,::1],)",
-        planes._fitted: f"({points}, {points}, {points}, {points})",
-        measuring.signed_distances: f"(i8[::1], f8, b1[:,::1], b1[::1], b1[:,:,::1], {views}, f8)",
+        planes._fit_all: f"({points}, {points}, {points}, {points}, f4[:,::1])",
+        measuring.signed_distances: f"(i8[::1], f8, {rows}, b1[::1], b1[:,:,::1], {views}, f8)",
         measuring.offsets: f"({points}, {points}, {views}, f8)",
         measuring.outlines: f"({points}, {points}, b1[::1], {views}, {points})",
         smoothing._around: f"({rows}, {points}, i8)",

@@ -162,7 +162,7 @@ def test_two_sides_of_a_sheet_are_told_apart():
     near = np.ones((9, 1, 1), bool)
     lowest = np.array([-3, 0, 0])
     value, weight = signed_distances(
-        lowest, 0.0005, near[:, :, 0], near[0, 0], near, plane, view, projection, 0.01
+        lowest, 0.0005, np.argwhere(near[:, :, 0]), near[0, 0], near, plane, view, projection, 0.01
     )
     x_m = (lowest[0] + np.arange(9)) * 0.0005
     expected = np.maximum(x_m - 0.001, -x_m)

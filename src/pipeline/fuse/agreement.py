@@ -108,13 +108,13 @@ def unprojected(u: np.ndarray, v: np.ndarray, depth_m: np.ndarray, K: np.ndarray
 
 def projected(points_camera: np.ndarray, K: np.ndarray, depth_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the measured depth (N,) where points (N, 3) of the camera's frame appear, 0 for none, and their own depth."""
-    z = points_camera[:, 2]
+    x, y, z = points_camera.T
     safe = np.where(z > 1e-6, z, 1.0)
-    pixel = np.rint((points_camera[:, :2] / safe[:, None]) * [K[0, 0], K[1, 1]] + K[:2, 2])
+    u, v = np.rint(x / safe * K[0, 0] + K[0, 2]), np.rint(y / safe * K[1, 1] + K[1, 2])
     height, width = depth_m.shape
-    inside = (z > 1e-6) & (pixel >= 0).all(axis=1) & (pixel[:, 0] < width) & (pixel[:, 1] < height)
-    u, v = np.where(inside, pixel.T, 0).astype(int)
-    return np.where(inside, depth_m[v, u], 0.0), z
+    inside = (z > 1e-6) & (u >= 0) & (v >= 0) & (u < width) & (v < height)
+    row, column = np.where(inside, v, 0).astype(int), np.where(inside, u, 0).astype(int)
+    return np.where(inside, depth_m[row, column], 0.0), z
 
 
 def agreement(views: Views, sample: Sample, T_world_cameras: np.ndarray, depth_factor: float) -> np.ndarray:

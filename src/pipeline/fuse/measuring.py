@@ -28,33 +28,34 @@ OUTLINE_BIAS_M = 0.00025
 def signed_distances(lowest, voxel, columns, layers, near, plane, view, projection, truncation):  # type: ignore[no-untyped-def]
     """Return signed distances (nx, ny, nz) in truncations, positive in the open, and how many views told.
 
-    lowest (3,): coordinates of the first voxel. columns (nx, ny), layers (nz,): where to look at all. near (nx, ny,
-    nz): where a surface may be; elsewhere two views that see past are enough, and amid blocks whose middles are
-    all free or all unseen no view is asked. The arrays of `Planes`; truncation in metres.
+    lowest (3,): coordinates of the first voxel. columns (C, 2), layers (nz,): where to look at all; what columns that follow each
+    other show stays in the processor's cache if they are near. near (nx, ny, nz): where a surface may be; elsewhere two views that
+    see past are enough, and amid blocks whose middles are all free or all unseen no view is asked. The arrays of `Planes`;
+    truncation in metres.
     """
     nx, ny, nz = near.shape
     amid = _amid(_blocks(lowest, voxel, near, plane, view, projection, truncation))
     value, weight = np.zeros((nx, ny, nz), np.float32), np.zeros((nx, ny, nz), np.float32)
-    seen, column = np.zeros((len(view), 5)), np.zeros((len(view), 3))
-    for ix in range(nx):
-        for iy in range(ny):
-            if not columns[ix, iy]:
+    z, layer, enough = np.zeros(nz), np.zeros(nz, np.int64), np.zeros(nz, np.int64)
+    seen, count, free = np.zeros((nz, len(view), 5)), np.zeros(nz, np.int64), np.zeros(nz, np.int64)
+    for ix, iy in columns:
+        asked = 0
+        for iz in range(nz):
+            block = amid[ix // TOGETHER, iy // TOGETHER, iz // TOGETHER]
+            if not layers[iz] or block == UNSEEN:
                 continue
-            x, y = (lowest[0] + ix) * voxel, (lowest[1] + iy) * voxel
-            _project(x, y, projection, column)
-            for iz in range(nz):
-                block = amid[ix // TOGETHER, iy // TOGETHER, iz // TOGETHER]
-                if not layers[iz] or block == UNSEEN:
-                    continue
-                if block == FREE:
-                    value[ix, iy, iz], weight[ix, iy, iz] = 1.0, LEAST_FREE
-                    continue
-                z = (lowest[2] + iz) * voxel
-                enough = len(view) if near[ix, iy, iz] else LEAST_FREE
-                count, free = _observed(x, y, z, column, plane, view, projection, truncation, enough, seen)
-                if count + free > 0:
-                    distance = _nearest_side(seen[:count], free * FREE_WORTH, truncation)
-                    value[ix, iy, iz], weight[ix, iy, iz] = distance / truncation, count + free
+            if block == FREE:
+                value[ix, iy, iz], weight[ix, iy, iz] = 1.0, LEAST_FREE
+                continue
+            z[asked], layer[asked] = (lowest[2] + iz) * voxel, iz
+            enough[asked] = len(view) if near[ix, iy, iz] else LEAST_FREE
+            asked += 1
+        x, y = (lowest[0] + ix) * voxel, (lowest[1] + iy) * voxel
+        _observe(x, y, z[:asked], enough, plane, view, projection, truncation, seen, count, free)
+        for i in range(asked):
+            if count[i] + free[i] > 0:
+                distance = _nearest_side(seen[i, : count[i]], free[i] * FREE_WORTH, truncation)
+                value[ix, iy, layer[i]], weight[ix, iy, layer[i]] = distance / truncation, count[i] + free[i]
     return value, weight
 
 
@@ -63,21 +64,23 @@ def _blocks(lowest, voxel, near, plane, view, projection, truncation):  # type: 
     """Return of each block of voxels what its middle is: free, unseen, or neither; or that a surface may be in it."""
     shape = [-(-n // TOGETHER) for n in near.shape]
     found = np.full((shape[0], shape[1], shape[2]), SURFACE, np.int8)
-    seen, column = np.zeros((len(view), 5)), np.zeros((len(view), 3))
+    z, layer, enough = np.zeros(shape[2]), np.zeros(shape[2], np.int64), np.full(shape[2], LEAST_FREE)
+    seen = np.zeros((shape[2], len(view), 5))
+    count, free = np.zeros(shape[2], np.int64), np.zeros(shape[2], np.int64)
     middle = (TOGETHER - 1) / 2
     for bx in range(shape[0]):
         for by in range(shape[1]):
-            x, y = (lowest[0] + bx * TOGETHER + middle) * voxel, (lowest[1] + by * TOGETHER + middle) * voxel
-            _project(x, y, projection, column)
+            asked = 0
             for bz in range(shape[2]):
                 i, j, k = bx * TOGETHER, by * TOGETHER, bz * TOGETHER
-                if near[i : i + TOGETHER, j : j + TOGETHER, k : k + TOGETHER].any():
-                    continue
-                z = (lowest[2] + k + middle) * voxel
-                count, free = _observed(
-                    x, y, z, column, plane, view, projection, truncation, LEAST_FREE, seen
-                )
-                found[bx, by, bz] = FREE if free >= LEAST_FREE else UNSEEN if count + free == 0 else NEITHER
+                if not near[i : i + TOGETHER, j : j + TOGETHER, k : k + TOGETHER].any():
+                    z[asked], layer[asked] = (lowest[2] + k + middle) * voxel, bz
+                    asked += 1
+            x, y = (lowest[0] + bx * TOGETHER + middle) * voxel, (lowest[1] + by * TOGETHER + middle) * voxel
+            _observe(x, y, z[:asked], enough, plane, view, projection, truncation, seen, count, free)
+            for i in range(asked):
+                is_free, is_unseen = free[i] >= LEAST_FREE, count[i] + free[i] == 0
+                found[bx, by, layer[i]] = FREE if is_free else UNSEEN if is_unseen else NEITHER
     return found
 
 
@@ -98,12 +101,34 @@ def _amid(blocks):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _project(x, y, projection, column):  # type: ignore[no-untyped-def]
-    """Write the part of the projections that is the same for all z to `column` (V, 3)."""
-    # One number at a time: assigning to a slice compiles numba's text of an error that cannot be, for seconds.
-    for k in range(len(projection)):
-        for c in range(3):
-            column[k, c] = projection[k, c, 0] * x + projection[k, c, 1] * y + projection[k, c, 3]
+def _observe(x, y, z, enough, plane, view, projection, truncation, seen, count, free):  # type: ignore[no-untyped-def]
+    """Write for places (M,) above each other distance, weight and normal of the planes within the truncation to `seen` (M, V, 5),
+    their number to `count` (M,), and to `free` (M,) that of views that see past: of `enough` (M,) views at most."""
+    count[: len(z)], free[: len(z)] = 0, 0
+    for k in range(len(view)):  # one after the other: neighbours fare alike, which processors foresee
+        P, left = projection[k], 0
+        a = P[0, 0] * x + P[0, 1] * y + P[0, 3]
+        b = P[1, 0] * x + P[1, 1] * y + P[1, 3]
+        w = P[2, 0] * x + P[2, 1] * y + P[2, 3]
+        for i in range(len(z)):
+            if free[i] >= enough[i] or (free[i] >= SURELY_FREE and count[i] == 0):
+                continue
+            left += 1
+            found = _row(a + P[0, 2] * z[i], b + P[1, 2] * z[i], w + P[2, 2] * z[i], k, view)
+            row = np.uint64(found)  # not counted from the end
+            if found < 0 or plane[row, 4] <= 0:
+                continue
+            distance = plane[row, 0] * x + plane[row, 1] * y + plane[row, 2] * z[i] - plane[row, 3]
+            if distance >= min(truncation, PAST_M * plane[row, 4]):
+                free[i] += 1
+            elif distance > -truncation:
+                # Across the ray a pixel is as uncertain as ever, along it by the tangent of the incidence more.
+                into = seen[i, count[i]]
+                into[0], into[1] = distance, plane[row, 4] ** 2
+                into[2], into[3], into[4] = plane[row, 0], plane[row, 1], plane[row, 2]
+                count[i] += 1
+        if left == 0:
+            return
 
 
 @numba.njit(cache=True)
@@ -121,33 +146,10 @@ def _row(a, b, w, k, view):  # type: ignore[no-untyped-def]
     if w <= 0:
         return -1
     inverse = 1.0 / w
-    u, v = int(np.floor(a * inverse + 0.5)), int(np.floor(b * inverse + 0.5))
+    u, v = a * inverse + 0.5, b * inverse + 0.5
     if u < 0 or v < 0 or u >= view[k, 1] or v >= view[k, 2]:
         return -1
-    return view[k, 0] + v * view[k, 1] + u
-
-
-@numba.njit(cache=True)
-def _observed(x, y, z, column, plane, view, projection, truncation, enough, seen):  # type: ignore[no-untyped-def]
-    """Fill `seen` with distance, weight and normal of the planes within the truncation; return their number and that of views
-    that see past. column (V, 3): the part of the projections that is the same for all z."""
-    count, free = 0, 0
-    for k in range(len(view)):
-        a, b = column[k, 0] + projection[k, 0, 2] * z, column[k, 1] + projection[k, 1, 2] * z
-        row = _row(a, b, column[k, 2] + projection[k, 2, 2] * z, k, view)
-        if row < 0 or plane[row, 4] <= 0:
-            continue
-        distance = plane[row, 0] * x + plane[row, 1] * y + plane[row, 2] * z - plane[row, 3]
-        if distance >= min(truncation, PAST_M * plane[row, 4]):
-            free += 1
-            if free >= enough or (free >= SURELY_FREE and count == 0):
-                break
-        elif distance > -truncation:
-            # Across the ray a pixel is as uncertain as ever, along it by the tangent of the incidence more.
-            seen[count, 0], seen[count, 1] = distance, plane[row, 4] ** 2
-            seen[count, 2], seen[count, 3], seen[count, 4] = plane[row, 0], plane[row, 1], plane[row, 2]
-            count += 1
-    return count, free
+    return view[k, 0] + int(v) * view[k, 1] + int(u)
 
 
 @numba.njit(cache=True)
@@ -214,14 +216,17 @@ def offsets(vertices, normals, plane, view, projection, reach):  # type: ignore[
     for k in range(len(view)):  # one after the other: a view's planes stay in the processor's cache
         for i in range(n):
             x, y, z = vertices[i]
-            row = _pixel(x, y, z, k, view, projection)
-            if row < 0 or plane[row, 4] <= 0:
+            found = _pixel(x, y, z, k, view, projection)
+            row = np.uint64(found)  # not counted from the end
+            if found < 0:
                 continue
-            p = plane[row]
-            cosine = p[0] * normals[i, 0] + p[1] * normals[i, 1] + p[2] * normals[i, 2]
-            distance = p[0] * x + p[1] * y + p[2] * z - p[3]
-            if cosine >= SAME_SIDE_COSINE and abs(distance) <= reach:
-                w = p[4] * cosine
+            a, b, c = plane[row, 0], plane[row, 1], plane[row, 2]
+            cosine = a * normals[i, 0] + b * normals[i, 1] + c * normals[i, 2]
+            if cosine < SAME_SIDE_COSINE or plane[row, 4] <= 0:
+                continue
+            distance = a * x + b * y + c * z - plane[row, 3]
+            if abs(distance) <= reach:
+                w = plane[row, 4] * cosine
                 offset[i] -= w * distance
                 weight[i] += w
     return offset / np.maximum(weight, 1e-12), weight
@@ -234,8 +239,11 @@ def outlines(vertices, normals, wanted, plane, view, projection, eye):  # type: 
     offset, count = np.zeros(n), np.zeros(n)
     for i in np.nonzero(wanted)[0]:
         for k in range(len(view)):
-            ray = vertices[i] - eye[k]
-            if abs((ray * normals[i]).sum()) > OUTLINE_COSINE * np.sqrt((ray**2).sum()):
+            along, square = 0.0, 0.0
+            for c in range(3):
+                along += (vertices[i, c] - eye[k, c]) * normals[i, c]
+                square += (vertices[i, c] - eye[k, c]) ** 2
+            if abs(along) > OUTLINE_COSINE * np.sqrt(square):
                 continue
             edge = _outline(vertices[i], normals[i], k, plane, view, projection)
             if not np.isnan(edge):

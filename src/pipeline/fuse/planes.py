@@ -39,17 +39,20 @@ def planes(views: Views, placement: Placement) -> Planes:
     """Fit planes to the part of every view that shows the space around the object; beyond it they face the camera."""
     corners = np.stack(np.meshgrid(*placement.bounds_m.T), axis=-1).reshape(-1, 3)
     poses = [placement.T_object_world @ T_world_camera for T_world_camera in views.T_world_cameras]
-    parts, windows, projections, start = [], [], [], 0
+    depths, cameras, windows, projections, start = [], [], [], [], 0
     for depth_m, K, T_object_camera in zip(views.depths_m, views.intrinsics, poses, strict=True):
         low, high = _window(corners, K, T_object_camera, depth_m.shape)
-        K = K - [[0, 0, low[0]], [0, 0, low[1]], [0, 0, 0]]
-        depth_m = np.ascontiguousarray(depth_m[low[1] : high[1], low[0] : high[0]])
-        parts.append(_fitted(inverse_depths(depth_m), K, T_object_camera, placement.bounds_m))
+        cameras.append(K - [[0, 0, low[0]], [0, 0, low[1]], [0, 0, 0]])
+        depths.append(np.ascontiguousarray(depth_m[low[1] : high[1], low[0] : high[0]]))
         windows.append((start, *(high - low)))
-        projections.append(K @ frames.inverse(T_object_camera)[:3])
-        start += len(parts[-1])
+        projections.append(cameras[-1] @ frames.inverse(T_object_camera)[:3])
+        start += depths[-1].size
+    plane = np.zeros((start, 5), np.float32)
+    for depth_m, K, T_object_camera, (first, *_) in zip(depths, cameras, poses, windows, strict=True):
+        own = plane[first : first + depth_m.size]
+        _fit_all(inverse_depths(depth_m), K, T_object_camera, placement.bounds_m, own)
     eyes = np.array([T[:3, 3] for T in poses])
-    return Planes(np.concatenate(parts), np.array(windows, np.int64), np.array(projections), eyes)
+    return Planes(plane, np.array(windows, np.int64), np.array(projections), eyes)
 
 
 @numba.njit(cache=True)
@@ -85,11 +88,10 @@ def _window(
 
 
 @numba.njit(cache=True)
-def _fitted(inverses, K, T_object_camera, bounds):  # type: ignore[no-untyped-def]
-    """Return the planes (H · W, 5) of a window's inverse depths (H, W)."""
+def _fit_all(inverses, K, T_object_camera, bounds, out):  # type: ignore[no-untyped-def]
+    """Write the planes of a window's inverse depths (H, W) to `out` (H · W, 5)."""
     height, width = inverses.shape
     weights = _weights()
-    out = np.zeros((height * width, 5), np.float32)
     for v in range(height):
         for u in range(width):
             if inverses[v, u] <= 0:
@@ -106,7 +108,6 @@ def _fitted(inverses, K, T_object_camera, bounds):  # type: ignore[no-untyped-de
             if a == 0.0 and b == 0.0:
                 a, b = x * inverse / (x * x + y * y + 1), y * inverse / (x * x + y * y + 1)
             _store(a, b, inverse - a * x - b * y, inverse, x, y, T_object_camera, out[v * width + u])
-    return out
 
 
 @numba.njit(cache=True)
@@ -120,11 +121,14 @@ def _within(x, y, z, T, bounds):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True)
 def _weights():  # type: ignore[no-untyped-def]
-    """Return how much neighbours (2 R + 1, 2 R + 1) count, by their distance in pixels."""
-    weights = np.zeros((2 * RADIUS_PX + 1, 2 * RADIUS_PX + 1))
+    """Return how much neighbours (2 R + 1, 2 R + 1, 6) count, by their distance in pixels: w, w du, w dv, w du², w du dv, w dv²."""
+    weights = np.zeros((2 * RADIUS_PX + 1, 2 * RADIUS_PX + 1, 6))
     for dv in range(-RADIUS_PX, RADIUS_PX + 1):
         for du in range(-RADIUS_PX, RADIUS_PX + 1):
-            weights[RADIUS_PX + dv, RADIUS_PX + du] = np.exp(-0.5 * (du * du + dv * dv) / SIGMA_PX**2)
+            w = np.exp(-0.5 * (du * du + dv * dv) / SIGMA_PX**2)
+            into = weights[RADIUS_PX + dv, RADIUS_PX + du]
+            into[0], into[1], into[2] = w, w * du, w * dv
+            into[3], into[4], into[5] = w * du * du, w * du * dv, w * dv * dv
     return weights
 
 
@@ -150,10 +154,10 @@ def _fit(inverses, weights, v, u, radius, gate, inverse, along, across):  # type
             # The depths are further apart than the gate, without a division.
             if q <= 0 or expected <= 0 or abs(expected - q) > gate * expected * q:
                 continue
-            w = weights[RADIUS_PX + dv, RADIUS_PX + du]
-            w0, wu, wv, wq = w0 + w, wu + w * du, wv + w * dv, wq + w * q
-            wuu, wuv, wvv = wuu + w * du * du, wuv + w * du * dv, wvv + w * dv * dv
-            wuq, wvq = wuq + w * du * q, wvq + w * dv * q
+            w = weights[np.uint64(RADIUS_PX + dv), np.uint64(RADIUS_PX + du)]
+            w0, wu, wv, wq = w0 + w[0], wu + w[1], wv + w[2], wq + w[0] * q
+            wuu, wuv, wvv = wuu + w[3], wuv + w[4], wvv + w[5]
+            wuq, wvq = wuq + w[1] * q, wvq + w[2] * q
             count += 1
     if count < _LEAST_PIXELS:
         return inverse, along, across, count

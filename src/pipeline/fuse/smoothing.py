@@ -68,7 +68,9 @@ def _alike(start, neighbour, normals, width):  # type: ignore[no-untyped-def]
             weight = np.exp(-0.5 * apart / width**2)
             for k in range(3):
                 mean[i, k] += weight * normals[j, k]
-        mean[i] /= np.sqrt((mean[i] ** 2).sum())
+        length = np.sqrt(mean[i, 0] ** 2 + mean[i, 1] ** 2 + mean[i, 2] ** 2)
+        for k in range(3):
+            mean[i, k] /= length
     return mean
 
 
@@ -76,6 +78,8 @@ def _alike(start, neighbour, normals, width):  # type: ignore[no-untyped-def]
 def smoothed(vertices, start, neighbour, move, rounds, factors):  # type: ignore[no-untyped-def]
     """Return vertices (V, 3) with short waves smoothed away and volumes kept (Taubin 1995); move (V, 3) weighs the steps."""
     now, after = vertices.copy(), np.zeros_like(vertices)
+    # Unsigned: numba then asks of no index whether it counts from the end, which costs a fifth of the time.
+    start, neighbour = start.astype(np.uint32), neighbour.astype(np.uint32)
     for step in range(rounds * len(factors)):
         _step(now, after, start, neighbour, move, factors[step % len(factors)])
         now, after = after, now
@@ -87,7 +91,8 @@ def _step(now, after, start, neighbour, move, factor):  # type: ignore[no-untype
     """Write vertices (V, 3) moved by a share of the way to the mean of their neighbours to `after`."""
     for i in range(len(now)):
         x, y, z = 0.0, 0.0, 0.0
-        for near in neighbour[start[i] : start[i + 1]]:
+        for k in range(start[i], start[i + 1]):
+            near = neighbour[k]
             x, y, z = x + now[near, 0], y + now[near, 1], z + now[near, 2]
         share = 1.0 / (start[i + 1] - start[i])
         after[i, 0] = now[i, 0] + factor * (x * share - now[i, 0]) * move[i, 0]

@@ -92,7 +92,8 @@ def _field(
     """Return the signed distance (nx, ny, nz) in truncations: unseen voxels are solid, beyond footprint, top and table is free."""
     near = _near(points_m, lowest, covered, truncation_m, voxel_m)
     arrays = seen_by.plane, seen_by.view, seen_by.projection
-    columns = covered.any(axis=2)
+    columns = np.argwhere(covered.any(axis=2))
+    columns = columns[np.lexsort((columns // BLOCK).T)]
     layers = ndimage.binary_dilation(covered.any(axis=(0, 1)), iterations=_AROUND)
     value, weight = measuring.signed_distances(lowest, voxel_m, columns, layers, near, *arrays, truncation_m)
     value = regularised(value, weight)
