@@ -63,15 +63,24 @@ def level(views: Views, i: int, name: str, rng: np.random.Generator) -> Levelled
         names=[views.names[i]],
     )
     _, place = placement.find(single, f"{name}, {views.names[i]}", rng)
+    found = shown(views, i, place)
+    if found is None:
+        raise PipelineError(
+            f"{name}, {views.names[i]}: expected an object on the table, found less than {LEAST_POINTS} points; keep it in view"
+        )
+    shift = frames.transform(np.eye(3), np.array([*-axis_of(found.points_m, found.normals), 0.0]))
+    return replace(
+        found, points_m=frames.apply(shift, found.points_m), T_level_camera=shift @ found.T_level_camera
+    )
+
+
+def shown(views: Views, i: int, place: Placement) -> Levelled | None:
+    """Return what view i shows of an object at `place`, whose world is the camera's frame; None when it is too little."""
     points, contrast, contrasts = _points(views, i, place)
     if len(points) < LEAST_POINTS:
-        raise PipelineError(
-            f"{name}, {views.names[i]}: expected an object on the table, found {len(points)} points; keep it in view"
-        )
+        return None
     points, normals, contrast = _even(points, contrast, place.T_object_world[:3, 3])
-    shift = frames.transform(np.eye(3), np.array([*-axis_of(points, normals), 0.0]))
-    T_level_camera = shift @ place.T_object_world
-    return Levelled(i, frames.apply(shift, points), normals, contrast, T_level_camera, contrasts)
+    return Levelled(i, points, normals, contrast, place.T_object_world, contrasts)
 
 
 def _points(views: Views, i: int, place: Placement) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:

@@ -1,34 +1,36 @@
 """Depth images on their way to fusion: poses checked, or found where there are none; table and object found."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from pipeline.errors import PipelineError
-from pipeline.fuse import agreement, placement, registration, table
+from pipeline.fuse import agreement, placement, posing, registration, table
 from pipeline.fuse.raw import Views
 from pipeline.fuse.table import Placement, Plane
 
-COARSE = 12  # pixels
 LEAST_SEEN, LOW_SHARE = 0.85, 0.1  # of the surface higher than this share of the object
 
 
 @dataclass(frozen=True)
 class Located:
     """Views that fit together, the table and the object on it; left_out: names of the views that do not fit;
-    registration: how poses were found, empty where they were given."""
+    registration: how poses were found, empty where they were given; poses_off_m: by how much they were off as given, and whether
+    they were refined."""
 
     views: Views
     plane: Plane
     placement: Placement
     left_out: list[str]
     registration: dict[str, Any]
+    poses_off_m: float | None = None
+    is_refined: bool = False
 
     @property
     def spread_m(self) -> float:
         """The noise of depth, from the table."""
-        return placement.spread_m(self.plane.height(table.world_points(self.views, COARSE).places_m))
+        return placement.spread_m(self.plane.height(table.world_points(self.views, posing.COARSE).places_m))
 
     def facts(self) -> dict[str, Any]:
         """Return what fusion.json says of the scan."""
@@ -45,9 +47,21 @@ class Located:
             "table_rms_m": self.plane.rms_m,
             "table_spread_m": self.spread_m,
             "eyes_object_m": eyes,
-            "poses": "registered" if self.registration else "given",
+            "poses": "registered" if self.registration else "refined" if self.is_refined else "given",
+            "poses_off_m": self.poses_off_m,
             **self.registration,
         }
+
+
+def complaints(scan: Located) -> list[str]:
+    """Return a sentence when the given poses do not fit together well."""
+    if not scan.is_refined:
+        return []
+    off_mm = 1e3 * (scan.poses_off_m or 0.0)
+    return [
+        f"the poses are off by {off_mm:.1f} mm, by the table in each view; they were refined on table and object; calibrate the "
+        "camera's pose better"
+    ]
 
 
 def located(views: Views, name: str, rng: np.random.Generator) -> Located:
@@ -61,7 +75,16 @@ def located(views: Views, name: str, rng: np.random.Generator) -> Located:
         views, found = registration.registered(views, name, rng)
     views, left_out = agreement.checked(views, name, rng)
     plane, place = placement.find(views, name, rng)
-    return Located(views, plane, place, left_out, found)
+    if found:
+        return Located(views, plane, place, left_out, found)
+    off_m = posing.off_m(views, place)
+    scan = Located(views, plane, place, left_out, found, off_m)
+    refined = posing.refined(views, place, name, rng) if off_m > posing.OFF_M else None
+    if refined is None:
+        return scan
+    views, unseen = refined
+    place = posing.shown_again(views, place)
+    return replace(scan, views=views, placement=place, left_out=left_out + unseen, is_refined=True)
 
 
 def check_registered(scan: Located, vertices_m: np.ndarray, seen: np.ndarray, name: str) -> None:

@@ -17,6 +17,7 @@ from pipeline.fuse.evidence import Evidence, nearest
 from pipeline.fuse.levelled import NORMAL_M, Levelled, axis_of, level
 from pipeline.fuse.raw import Views
 from pipeline.fuse.smoothing import vertex_normals
+from pipeline.fuse.table import Placement
 from pipeline.fuse.together import ALIKE, HOLD, ROBUST_M, fitted_together, motions, moved
 from pipeline.geometry import frames
 
@@ -57,12 +58,12 @@ def registered(views: Views, name: str, rng: np.random.Generator) -> tuple[Views
     stood, left_out = _levelled(views, name, rng)
     poses, told = _placed(stood, views, rng)
     if views.colours:  # which the surface does not have
-        poses = _swept(stood, poses, rng)
+        poses = swept(stood, poses, rng)
     if told < TOLD:
         poses = _all_round(stood, poses)
-    poses = _fitted_to_surface(stood, poses, views, name, rng)
+    poses = fitted_to_surface(stood, poses, views, name, rng)
     facts = {"views_without_object": left_out, "roll_observable": told >= TOLD, "roll_evidence": told}
-    return _with(views, stood, poses), facts
+    return posed(views, stood, poses), facts
 
 
 def _all_round(stood: list[Levelled], poses: list[np.ndarray]) -> list[np.ndarray]:
@@ -232,7 +233,7 @@ def _fitting_step(here: np.ndarray, there: np.ndarray, normals: np.ndarray) -> n
     return moved(*np.linalg.solve(normal, right))
 
 
-def _swept(stood: list[Levelled], poses: list[np.ndarray], rng: np.random.Generator) -> list[np.ndarray]:
+def swept(stood: list[Levelled], poses: list[np.ndarray], rng: np.random.Generator) -> list[np.ndarray]:
     """Return the poses after every view was fitted to those of the other half, again and again."""
     poses = list(poses)
     fine = [_some(view, FINE, rng) for view in stood]
@@ -244,17 +245,27 @@ def _swept(stood: list[Levelled], poses: list[np.ndarray], rng: np.random.Genera
     return poses
 
 
-def _fitted_to_surface(
-    stood: list[Levelled], poses: list[np.ndarray], views: Views, name: str, rng: np.random.Generator
+def fitted_to_surface(
+    stood: list[Levelled],
+    poses: list[np.ndarray],
+    views: Views,
+    name: str,
+    rng: np.random.Generator,
+    known: Placement | None = None,
 ) -> list[np.ndarray]:
     """Return the poses after views were fused and fitted to the surface, again and again.
 
-    The surface is the mean of all views, so its normals and edges are better than those of any one.
+    The surface is the mean of all views, so its normals and edges are better than those of any one. known: where the object
+    stands in the level frames, when that is known.
     """
     for _ in range(ROUNDS):
-        posed = _with(views, stood, poses)
-        _, place = placement.find(posed, name, rng)
-        surface = tsdf.fuse(posed, place, VOXEL_M, 2 * VOXEL_M, name)
+        shown = posed(views, stood, poses)
+        if known is None:
+            _, place = placement.find(shown, name, rng)
+        else:
+            own = [frames.apply(T, view.points_m) for view, T in zip(stood, poses, strict=True)]
+            place = replace(known, points_m=np.concatenate(own))
+        surface = tsdf.fuse(shown, place, VOXEL_M, 2 * VOXEL_M, name)
         T_world_object = frames.inverse(place.T_object_world)
         normals = frames.rotate(T_world_object, vertex_normals(surface.vertices_m, surface.triangles, 1))
         vertices = frames.apply(T_world_object, surface.vertices_m)
@@ -262,7 +273,7 @@ def _fitted_to_surface(
     return poses
 
 
-def _with(views: Views, stood: list[Levelled], poses: list[np.ndarray]) -> Views:
+def posed(views: Views, stood: list[Levelled], poses: list[np.ndarray]) -> Views:
     """Return the views in their own order with poses T_world_camera."""
     order = sorted(range(len(stood)), key=lambda k: stood[k].number)
     chosen = [stood[k].number for k in order]
