@@ -107,3 +107,24 @@ def test_an_object_on_a_turntable_stands_on_it(tmp_path):
     plane, place = found(tmp_path, low, lower, table=False)
     assert plane.offset_m == pytest.approx(-recording.TABLE_HEIGHT_M, abs=0.0005)
     check_cup(place)
+
+
+def test_an_object_on_a_board_of_markers_stands_on_it(tmp_path):
+    """A board of 5 mm is lower than what counts as an object, and is none of it."""
+    board = box(0.03, -0.02, (0.24, 0.2, 0.005), recording.TABLE_HEIGHT_M - 0.005)
+    lower = box(0.0, 0.0, (0.9, 0.9, 0.02), recording.TABLE_HEIGHT_M - 0.025)
+    plane, place = found(tmp_path, board, lower, table=False)
+    assert plane.offset_m == pytest.approx(-recording.TABLE_HEIGHT_M, abs=0.0007)
+    check_cup(place)
+
+
+def test_a_lid_is_no_turntable(tmp_path):
+    """A pot with a flat lid and a knob is one object, knob and all."""
+    pot = trimesh.creation.cylinder(0.045, 0.1, sections=64)
+    pot.apply_translation([0.0, 0.0, 0.05])
+    knob = trimesh.creation.cylinder(0.01, 0.015, sections=32)
+    knob.apply_translation([0.0, 0.0, 0.1075])
+    body = trimesh.util.concatenate([pot, knob])
+    lidded = body.vertices + [0.03, -0.02, recording.TABLE_HEIGHT_M], body.faces
+    _, place = found(tmp_path, lidded)
+    assert place.bounds_m[1, 2] == pytest.approx(0.115 + placement.MARGIN_M, abs=0.003)

@@ -153,6 +153,11 @@ def test_what_was_not_seen_at_all_is_named():
     assert "inner wall was poorly seen, 30%" in told[1]
 
 
+def test_a_saucer_lacks_no_wall():
+    assert coverage.complaints({"floor": 0.9, "inner_wall": None, "rim": 1.0, "outer_wall": 1.0}) == []
+    assert len(coverage.complaints({"floor": None, "inner_wall": None, "rim": 1.0, "outer_wall": 1.0})) == 2
+
+
 def test_two_sides_of_a_sheet_are_told_apart():
     """Two views of a sheet 1 mm thick, from either side: free on both sides, solid only between them."""
     plane = np.array([[1, 0, 0, 0.001, 1], [-1, 0, 0, 0, 1]], np.float32)

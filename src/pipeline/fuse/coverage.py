@@ -49,6 +49,8 @@ def complaints(shares: dict[str, float | None], thickened_share: float = 0.0) ->
     told = []
     for name, share in shares.items():
         what = name.replace("_", " ")
+        if share is None and name == "inner_wall" and shares["floor"] is not None:
+            continue  # a saucer, all floor
         if share is None:
             told.append(f"the {what} was not seen at all: dark or shiny, or no view from high enough")
         elif share < POOR:

@@ -26,10 +26,13 @@ LEAST_OF_A_VIEW = 60
 SECOND_M, SECOND_POINTS, SECOND_VIEWS = 0.15, 0.15, 0.5
 # A base under the object: its border is flat, it is so many times larger than what stands on it.
 FLAT_M, FLAT_SHARE, BASE_AREAS = 0.004, 0.7, 2.0
+LEAST_STANDING = 0.25  # of the base's height: what is lower is a lid's knob, and no object
 OTHERS = 12  # views that are asked whether they look through a point
 # What is nearer together is one thing; in a single view its own shadow lies between its parts.
 GAP_M, SHADOW_M = 0.016, 0.12
 AROUND_M = 0.15  # the table is fitted again this far around the object: depth cameras bend large planes
+# Beside the object lies a board when its top is between these heights above the table; a higher one is a platter.
+BESIDE_M, LEAST_BOARD_M, MOST_BOARD_M = 0.03, 0.002, 0.012
 _ASKED = 300_000  # points at most tell heights, noise, and what is below the table: every so many
 _HITS_OF_NOISE = 3  # stray pixels hit a cell once or twice; a cell of the object is hit by many views
 
@@ -77,10 +80,11 @@ def find(views: Views, name: str, rng: np.random.Generator) -> tuple[Plane, Plac
     for plane in table.planes(near.places_m, eyes, name, rng):
         try:
             first = place(some, _above(near, plane, views), plane, middle, views, name)
-            height_m = _platter_m(first)
-            if height_m is not None:
-                plane = Plane(plane.normal, plane.offset_m - height_m, plane.rms_m)
-            plane = _locally(some, plane, first, eyes, on_it=height_m is not None)
+            platter_m, board_m = _platter_m(first), _board_m(some, plane, first)
+            plane = Plane(plane.normal, plane.offset_m - (platter_m or board_m), plane.rms_m)
+            plane = _locally(
+                some, plane, first, eyes, platter_m is not None, BESIDE_M if board_m else AROUND_M
+            )
             return plane, place(some, _above(near, plane, views), plane, middle, views, name)
         except NoObject as failure:
             failures.append(failure)
@@ -162,6 +166,8 @@ def _platter_m(placement: Placement) -> float | None:
     height = float(np.median(top[border]))
     flat = np.abs(top - height) < FLAT_M
     above = top > height + ABOVE_M
+    if np.sort(z)[-min(10, len(z))] - height < LEAST_STANDING * height:
+        return None
     if np.mean(flat[border]) < FLAT_SHARE or np.count_nonzero(z > height + ABOVE_M) < LEAST_POINTS:
         return None
     if np.count_nonzero(held) < BASE_AREAS * np.count_nonzero(ndimage.binary_fill_holes(above)):
@@ -169,15 +175,33 @@ def _platter_m(placement: Placement) -> float | None:
     return float(np.median(z[np.abs(z - height) < FLAT_M]))
 
 
+def _board_m(points_m: np.ndarray, plane: Plane, placement: Placement) -> float:
+    """Return the height of what lies flat beside the object on all sides, such as a board of markers; 0 when it is the table."""
+    x, y, z = frames.apply(placement.T_object_world, points_m).T
+    low, high = placement.bounds_m[0] - BESIDE_M, placement.bounds_m[1] + BESIDE_M
+    beside = (x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1]) & (np.abs(z) < MOST_BOARD_M)
+    beside &= ~placement.covers(x, y)
+    if np.count_nonzero(beside) < LEAST_POINTS:
+        return 0.0
+    height_m = float(np.median(z[beside]))
+    flat = np.mean(np.abs(z[beside] - height_m) < FLAT_M) > FLAT_SHARE
+    return height_m if flat and height_m > LEAST_BOARD_M else 0.0
+
+
 def _locally(
-    points_m: np.ndarray, plane: Plane, placement: Placement, eyes: np.ndarray, on_it: bool
+    points_m: np.ndarray,
+    plane: Plane,
+    placement: Placement,
+    eyes: np.ndarray,
+    on_it: bool,
+    reach_m: float,
 ) -> Plane:
-    """Return the plane fitted again to the table around the object, or to the base that it stands on."""
+    """Return the plane fitted again to the table so far around the object, or to the base that it stands on."""
     x, y, _ = frames.apply(placement.T_object_world, points_m).T
     own = placement.covers(x, y)
     if on_it:
         return table.refined(points_m[own], plane.normal, plane.offset_m, eyes)
-    low, high = placement.bounds_m[0] - AROUND_M, placement.bounds_m[1] + AROUND_M
+    low, high = placement.bounds_m[0] - reach_m, placement.bounds_m[1] + reach_m
     around = (x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1]) & ~own
     if np.count_nonzero(around) < LEAST_POINTS:
         return plane

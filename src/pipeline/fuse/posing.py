@@ -11,8 +11,9 @@ from pipeline.geometry import frames
 
 # Right poses are off by 0.1 mm, the error of a mean; half a millimetre already makes walls of three millimetres uneven.
 OFF_M = 0.00035
-COARSE, FINE = 12, 3  # pixels
-AROUND_M, NEAR_M = 0.15, 0.015  # the object, and the plane: what counts as the table there
+COARSE, MEDIUM, FINE = 12, 6, 3  # pixels
+AROUND_M, NEAR_M = 0.06, 0.015  # the object, and the plane: what counts as the table there
+ALIKE_M = 0.003  # around the median height in a view; beyond it is a board's edge or clutter
 LEAST_POINTS = 30
 # A pose is off by less at the object. Where more makes the views fit, they show too little of table and object to tell.
 MOST_M = 0.015
@@ -23,11 +24,10 @@ HELD_M2 = 0.05
 
 def off_m(views: Views, place: Placement) -> float:
     """Return how far the poses are off by the heights of the table around the object: root mean square over the views."""
-    points, view = _table(views, place, COARSE)
-    n = len(views.depths_m)
-    count, total = np.bincount(view, minlength=n), np.bincount(view, points[:, 2], minlength=n)
-    shows = count >= LEAST_POINTS
-    return float(np.sqrt(np.mean((total[shows] / count[shows]) ** 2))) if shows.any() else 0.0
+    points, view = _table(views, place, MEDIUM)
+    shown = [points[view == i, 2] for i in range(len(views.depths_m))]
+    heights_m = [float(z[np.abs(z - np.median(z)) < ALIKE_M].mean()) for z in shown if len(z) >= LEAST_POINTS]
+    return float(np.sqrt(np.mean(np.square(heights_m)))) if heights_m else 0.0
 
 
 def refined(

@@ -209,8 +209,8 @@ def audit(axis: "Axes", checks: "pd.DataFrame", trials: "pd.DataFrame") -> None:
     cells = [[what, f"{n:,}", f"{leaked:,}", failed] for what, n, leaked, failed in lines]
     table = axis.table(
         cells,
-        colLabels=["", "trials", "particles\nthrough a wall", "failed"],
-        colWidths=[0.44, 0.16, 0.26, 0.14],
+        colLabels=["", "trials", "particles\nleaked", "failed"],
+        colWidths=[0.46, 0.18, 0.20, 0.16],
         edges="horizontal",
         loc="center",
     )
