@@ -63,22 +63,20 @@ def level(views: Views, i: int, name: str, rng: np.random.Generator) -> Levelled
         names=[views.names[i]],
     )
     _, place = placement.find(single, f"{name}, {views.names[i]}", rng)
-    found = shown(views, i, place)
-    if found is None:
-        raise PipelineError(
-            f"{name}, {views.names[i]}: expected an object on the table, found less than {LEAST_POINTS} points; keep it in view"
-        )
+    found = shown(views, i, place, name)
     shift = frames.transform(np.eye(3), np.array([*-axis_of(found.points_m, found.normals), 0.0]))
     return replace(
         found, points_m=frames.apply(shift, found.points_m), T_level_camera=shift @ found.T_level_camera
     )
 
 
-def shown(views: Views, i: int, place: Placement) -> Levelled | None:
-    """Return what view i shows of an object at `place`, whose world is the camera's frame; None when it is too little."""
+def shown(views: Views, i: int, place: Placement, name: str) -> Levelled:
+    """Return what view i shows of an object at `place`, whose world is the camera's frame; a `PipelineError` if too little."""
     points, contrast, contrasts = _points(views, i, place)
     if len(points) < LEAST_POINTS:
-        return None
+        raise PipelineError(
+            f"{name}, {views.names[i]}: expected an object on the table, found {len(points)} points; keep it in view"
+        )
     points, normals, contrast = _even(points, contrast, place.T_object_world[:3, 3])
     return Levelled(i, points, normals, contrast, place.T_object_world, contrasts)
 

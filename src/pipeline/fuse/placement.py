@@ -166,7 +166,7 @@ def _platter_m(placement: Placement) -> float | None:
     height = float(np.median(top[border]))
     flat = np.abs(top - height) < FLAT_M
     above = top > height + ABOVE_M
-    if np.sort(z)[-min(10, len(z))] - height < LEAST_STANDING * height:
+    if np.sort(z)[-10] - height < LEAST_STANDING * height:
         return None
     if np.mean(flat[border]) < FLAT_SHARE or np.count_nonzero(z > height + ABOVE_M) < LEAST_POINTS:
         return None
@@ -178,9 +178,7 @@ def _platter_m(placement: Placement) -> float | None:
 def _board_m(points_m: np.ndarray, plane: Plane, placement: Placement) -> float:
     """Return the height of what lies flat beside the object on all sides, such as a board of markers; 0 when it is the table."""
     x, y, z = frames.apply(placement.T_object_world, points_m).T
-    low, high = placement.bounds_m[0] - BESIDE_M, placement.bounds_m[1] + BESIDE_M
-    beside = (x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1]) & (np.abs(z) < MOST_BOARD_M)
-    beside &= ~placement.covers(x, y)
+    beside = placement.beside(x, y, BESIDE_M) & (np.abs(z) < MOST_BOARD_M)
     if np.count_nonzero(beside) < LEAST_POINTS:
         return 0.0
     height_m = float(np.median(z[beside]))
@@ -198,11 +196,9 @@ def _locally(
 ) -> Plane:
     """Return the plane fitted again to the table so far around the object, or to the base that it stands on."""
     x, y, _ = frames.apply(placement.T_object_world, points_m).T
-    own = placement.covers(x, y)
     if on_it:
-        return table.refined(points_m[own], plane.normal, plane.offset_m, eyes)
-    low, high = placement.bounds_m[0] - reach_m, placement.bounds_m[1] + reach_m
-    around = (x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1]) & ~own
+        return table.refined(points_m[placement.covers(x, y)], plane.normal, plane.offset_m, eyes)
+    around = placement.beside(x, y, reach_m)
     if np.count_nonzero(around) < LEAST_POINTS:
         return plane
     return table.refined(points_m[around], plane.normal, plane.offset_m, eyes)

@@ -53,6 +53,12 @@ class Placement:
         inside[inside] = self.footprint[np.minimum(i, nx - 1), np.minimum(j, ny - 1)]
         return inside
 
+    def beside(self, x_m: np.ndarray, y_m: np.ndarray, reach_m: float) -> np.ndarray:
+        """Return whether (x, y) of the object frame are off the footprint and at most `reach_m` from its bounds."""
+        low, high = self.bounds_m[0] - reach_m, self.bounds_m[1] + reach_m
+        near = (x_m > low[0]) & (x_m < high[0]) & (y_m > low[1]) & (y_m < high[1])
+        return near & ~self.covers(x_m, y_m)
+
 
 @dataclass(frozen=True)
 class Points:
