@@ -31,7 +31,7 @@ def test_right_poses_stay_as_given(scan):
     assert found.facts()["poses"] == "given"
     assert found.poses_off_m < posing.OFF_M / 2
     np.testing.assert_array_equal(found.views.T_world_cameras, views.T_world_cameras)
-    assert recorded.complaints(found) == []
+    assert recorded.complaints(found.facts()) == []
 
 
 @pytest.mark.parametrize("name", ["mug", "square_bowl"])
@@ -41,7 +41,7 @@ def test_poses_of_a_shaky_arm_are_refined(scan, name):
     found = located(shaken(layouts.read(case.folder), 0.0015, 0.3))
     assert found.facts()["poses"] == "refined"
     assert found.poses_off_m == pytest.approx(0.0027, abs=0.0007)
-    assert "refined on table and object" in recorded.complaints(found)[0]
+    assert "refined on table and object" in recorded.complaints(found.facts())[0]
     surface = tsdf.fuse(found.views, found.placement, 0.00125, 0.0025, name)
     room = cavity(surface.vertices_m, surface.triangles, name=name)
     assert room.capacity_m3 == pytest.approx(case.shape.capacity_m3, rel=0.02)
@@ -60,3 +60,9 @@ def test_what_a_view_shows_of_the_table_stands_it_upright():
     strip = level * [0.02, 1.0, 1.0]  # tells no tilt about itself, and little of the height
     assert abs(posing._upright(frames.apply(off, strip))[0, 2]) < 0.002
     np.testing.assert_array_equal(posing._upright(level[:5]), np.eye(4))
+
+
+@pytest.mark.parametrize(("spread_m", "told"), [(0.0021, 0), (0.0033, 1)])
+def test_depth_too_noisy_for_walls_is_named(spread_m, told):
+    found = recorded.complaints({"poses": "given", "poses_off_m": 0.0, "table_spread_m": spread_m})
+    assert sum("noisy" in sentence and "3.3 mm" in sentence for sentence in found) == told

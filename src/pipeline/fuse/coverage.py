@@ -12,6 +12,15 @@ RIM_M = 0.004  # from the edge between inside and outside, as everywhere
 FLOOR_COSINE = 0.7  # what faces up within 45° is floor
 MUCH_THICKENED = 0.01  # of the outside: is named
 POOR = 0.8  # a part of which less was seen is named
+GUESSED = 0.3  # of the inner wall or of the floor: with less of it the capacity is unknown
+NO_INSIDE = (
+    "no inside that is open upwards was seen: it has a lid, lies on its side or stands upside down, or no view looked in; "
+    "stand it upright and open, and look from above 60°"
+)
+BLIND = (
+    "its capacity is a guess, as hardly any view looked in; look from above 60° or, where the neck is too narrow for that, "
+    "drop a mesh of it with its inside"
+)
 
 
 def parts(surface: Surface) -> dict[str, np.ndarray]:
@@ -46,20 +55,28 @@ def shares_seen(surface: Surface) -> dict[str, float | None]:
 
 def complaints(shares: dict[str, float | None], thickened_share: float = 0.0) -> list[str]:
     """Return one sentence for each part that was poorly seen or not at all, and one for a wall that had to be thickened."""
-    told = []
-    for name, share in shares.items():
-        what = name.replace("_", " ")
-        if share is None and name == "inner_wall" and shares["floor"] is not None:
-            continue  # a saucer, all floor
-        if share is None:
-            told.append(f"the {what} was not seen at all: dark or shiny, or no view from high enough")
-        elif share < POOR:
-            told.append(f"the {what} was poorly seen, {share:.0%} of it; the rest is closed by guess")
+    inside = [shares.get("inner_wall"), shares.get("floor")]
+    told = [NO_INSIDE] if shares and inside == [None, None] else _poor(shares)
+    if any(share is not None and share < GUESSED for share in inside):
+        told.append(BLIND)
     if thickened_share > MUCH_THICKENED:
         told.append(
             f"the wall is too thin for this camera: {thickened_share:.0%} of the outside was moved to be "
             f"{walls.LEAST_WALL_M * 1e3:.1f} mm from the inside"
         )
+    return told
+
+
+def _poor(shares: dict[str, float | None]) -> list[str]:
+    told = []
+    for name, share in shares.items():
+        what = name.replace("_", " ")
+        if share is None and name == "inner_wall":
+            continue  # a saucer, all floor
+        if share is None:
+            told.append(f"the {what} was not seen at all: dark or shiny, or no view from high enough")
+        elif share < POOR:
+            told.append(f"the {what} was poorly seen, {share:.0%} of it; the rest is closed by guess")
     return told
 
 
