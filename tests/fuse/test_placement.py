@@ -95,6 +95,18 @@ def test_two_objects_are_an_error_that_shows_both(tmp_path):
         assert min(np.hypot(x / z - int(u), y / z - int(v)) for u, v in shown) < 5
 
 
+@pytest.mark.parametrize("turn_deg", [0, 45])
+def test_how_far_a_long_thing_is_does_not_depend_on_the_frame(tmp_path, turn_deg):
+    """A board on edge, 18 cm away: its box in a frame turned by 45° comes within 5 cm of the cup."""
+    turn = frames.rotation_about(np.array([0.0, 0.0, 1.0]), np.radians(turn_deg))
+    vertices, triangles = box(-0.22, 0.0, (0.02, 0.26, 0.08))
+    middle = np.array([0.03, -0.02, 0.0])
+    _, place = found(
+        tmp_path, (frames.rotate(frames.transform(turn, np.zeros(3)), vertices) + middle, triangles)
+    )
+    check_cup(place)
+
+
 def test_a_crumb_beside_the_object_is_none(tmp_path):
     _, place = found(tmp_path, box(0.09, 0.0, (0.012, 0.012, 0.012)))
     check_cup(place)

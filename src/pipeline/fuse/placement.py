@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import ndimage
+from scipy.spatial import cKDTree
 
 from pipeline.errors import PipelineError
 from pipeline.fuse import agreement, table
@@ -34,6 +35,7 @@ AROUND_M = 0.15  # the table is fitted again this far around the object: depth c
 # Beside the object lies a board when its top is between these heights above the table; a higher one is a platter.
 BESIDE_M, LEAST_BOARD_M, MOST_BOARD_M = 0.03, 0.002, 0.012
 _ASKED = 300_000  # points at most tell heights, noise, and what is below the table: every so many
+_COMPARED = 5_000  # points of each of two objects
 _HITS_OF_NOISE = 3  # stray pixels hit a cell once or twice; a cell of the object is hit by many views
 
 
@@ -143,7 +145,7 @@ def place(
         )
     cluster = found[0]
     _check_size(cluster, name)
-    _check_alone(found, middle, frames.inverse(T_table_world), views, name)
+    _check_alone(found, places, middle, frames.inverse(T_table_world), views, name)
     own = places[cluster.mask]
     centre = np.array([*cluster.centre_m, 0.0])
     T_object_world = frames.transform(np.eye(3), -centre) @ T_table_world
@@ -255,15 +257,17 @@ def _check_size(cluster: Cluster, name: str) -> None:
 
 
 def _check_alone(
-    found: list[Cluster], middle: np.ndarray, T_world_table: np.ndarray, views: Views | None, name: str
+    found: list[Cluster],
+    places: np.ndarray,
+    middle: np.ndarray,
+    T_world_table: np.ndarray,
+    views: Views | None,
+    name: str,
 ) -> None:
     first = found[0]
     reach = np.linalg.norm(first.centre_m - middle)
     for other in found[1:]:
-        low, high = first.bounds_m[:, :2]
-        gap = np.linalg.norm(
-            np.maximum(np.maximum(low - other.bounds_m[1, :2], other.bounds_m[0, :2] - high), 0.0)
-        )
+        gap = _apart_m(places[first.mask], places[other.mask])
         central = np.linalg.norm(other.centre_m - middle) < 1.5 * reach + 0.05
         alike = other.n > SECOND_POINTS * first.n and other.views >= SECOND_VIEWS
         if alike and (gap < SECOND_M or central):
@@ -271,6 +275,12 @@ def _check_alone(
                 f"{name}: expected one object on the table, found two, {first.shown(T_world_table, views)} and "
                 f"{other.shown(T_world_table, views)}; record one at a time"
             )
+
+
+def _apart_m(one: np.ndarray, other: np.ndarray) -> float:
+    """Return how far the points (N, 3) and (M, 3) are from each other, seen from above; boxes around them depend on the frame."""
+    flat = [table.thinned(points[:, :2], _COMPARED) for points in (one, other)]
+    return float(cKDTree(flat[0]).query(flat[1])[0].min())
 
 
 def _check_below(placement: Placement, points_m: np.ndarray, name: str) -> None:
