@@ -148,6 +148,25 @@ def test_mesh_in_millimetres_and_the_cure(tmp_path):
     np.testing.assert_allclose(np.ptp(fused(folder, **OPTIONS).mesh[0], axis=0), 0.08, rtol=1e-6)
 
 
+def test_mesh_in_inches_is_not_told_to_be_in_millimetres(tmp_path):
+    box(tmp_path / "inch" / "cup.stl", 3.5)
+    message = refused(tmp_path / "inch", "3.5 m", "centimetres or inches")
+    assert "units: mm" not in message
+
+
+def test_mesh_of_unit_size_and_the_cure(tmp_path):
+    folder = tmp_path / "unit"
+    box(folder / "cup.obj", 1.0)
+    refused(folder, "1 m", "true size", "units: m")
+    (folder / "scan.yaml").write_text("units: cm\n")
+    np.testing.assert_allclose(np.ptp(fused(folder, **OPTIONS).mesh[0], axis=0), 0.01, rtol=1e-6)
+
+
+def test_a_frame_without_its_pose(folder):
+    (folder / "frame-000004.pose.txt").unlink()
+    refused(folder, "frame-000004.pose.txt", "add it or remove the frame")
+
+
 def test_tiny_mesh(tmp_path):
     box(tmp_path / "tiny" / "cup.obj", 0.001)
     refused(tmp_path / "tiny", "cup.obj", "1 mm", "units")

@@ -6,8 +6,10 @@ import pytest
 import trimesh
 
 from pipeline import artefacts
+from pipeline.errors import PipelineError
 from pipeline.fuse.fusion import fused
 from pipeline.geometry import frames
+from pipeline.geometry.cavity import cavity
 from pipeline.scan.shapes import shape
 
 OPTIONS = {"voxel_m": 0.001, "truncation_m": 0.002, "n_points": 5000, "seed": 2}
@@ -68,6 +70,32 @@ def test_flipped_and_doubled_faces_are_mended(tmp_path):
     upper = floor.z_m > 0.001
     assert (floor.nz[upper] > 0).all()
     assert (floor.nz[~upper] < 0).all()
+
+
+def on_ground(size_m: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
+    """A straight cup, whose wall's triangles reach from the ground to the rim, on the two triangles of a ground."""
+    cup = trimesh.creation.revolve(
+        [[0, 0], [0.04, 0], [0.04, 0.09], [0.037, 0.09], [0.037, 0.004], [0, 0.004]], sections=64
+    )
+    ground = trimesh.Trimesh(
+        size_m / 2 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]), [[0, 1, 2], [0, 2, 3]]
+    )
+    both = trimesh.util.concatenate([cup, ground])
+    return np.asarray(both.vertices), np.asarray(both.faces)
+
+
+def test_a_ground_in_the_mesh_is_named(tmp_path):
+    with pytest.raises(PipelineError, match="on_table: true"):
+        drop(tmp_path / "cup", *on_ground())
+
+
+def test_a_ground_in_the_mesh_is_cut_away_and_long_walls_with_it_are_not(tmp_path):
+    (tmp_path / "cup").mkdir()
+    (tmp_path / "cup" / "scan.yaml").write_text("on_table: true\n")
+    vertices, triangles = drop(tmp_path / "cup", *on_ground()).mesh
+    np.testing.assert_allclose(np.ptp(vertices, axis=0), [0.08, 0.08, 0.09], atol=2e-4)
+    capacity_m3 = cavity(vertices, triangles, name="cup").capacity_m3
+    assert capacity_m3 == pytest.approx(np.pi * 0.037**2 * 0.086, rel=0.01)
 
 
 def test_same_mesh_same_cloud(tmp_path):

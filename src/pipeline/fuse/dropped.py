@@ -8,12 +8,15 @@ import numpy as np
 from pipeline.errors import PipelineError
 from pipeline.fuse import clouds, drains, mending, raw, standing
 from pipeline.fuse.raw import UPS, DroppedMesh
+from pipeline.fuse.table import Placement
 from pipeline.fuse.wrapping import Mesh, wrapped
 from pipeline.geometry import frames
 from pipeline.geometry.cavity import cavity
 from pipeline.geometry.sampling import uniform_points
 
 LARGEST_M, SMALLEST_M = 2.0, 0.005
+LARGEST_UNTOLD_M = 0.6  # without `units`: a mesh of unit size is as likely one that was normalised
+LEAST_IN_MM = 30.0  # what is larger is no number of centimetres or inches
 CLOUDS = (".pcd", ".npz")
 TABLE_SAMPLES = 100_000
 _OF_IMAGES = {"depth_scale": "it has no depth images", "turntable_deg": "it has no views"}
@@ -42,21 +45,34 @@ def _from_mesh(
     file, options = str(dropped.path), dropped.options
     mesh.vertices = np.asarray(mesh.vertices, float) * (options.unit_m or 1.0)
     mesh = mending.cleaned(mesh, file)
-    _check_size(mesh.vertices, dropped.path)
+    _check_size(mesh.vertices, dropped)
     up = options.up or "z"
     T_object_world = upright(mesh.vertices, up)
-    if options.on_table:
-        sample, _ = uniform_points(*mending.arrays(mesh), TABLE_SAMPLES, rng)
-        place = standing.found(sample, True, file, rng)
-        if place is not None:
-            _refuse_up(dropped)
-            mesh.update_faces(standing.belongs(np.asarray(mesh.vertices), place)[mesh.faces].all(axis=1))
-            T_object_world, up = place.T_object_world, "z"
+    place = _on_table(mesh, dropped, rng)
+    if place is not None:
+        _refuse_up(dropped)
+        mesh, T_object_world, up = standing.cut(mesh, place), place.T_object_world, "z"
     mesh.vertices = frames.apply(T_object_world, mesh.vertices)
     mesh = mending.cleaned(mesh, file)
     whole, facts = mending.mended(mesh, options.wall_m, file, rng)
     whole, done = _holding(whole, up, file)
     return whole, T_object_world, {"layout": "mesh", "n_views": 0, "mended": facts | done}
+
+
+def _on_table(mesh: Any, dropped: DroppedMesh, rng: np.random.Generator) -> Placement | None:
+    """Return where the object stands on a table that the mesh holds as well; refuse one that scan.yaml does not speak of."""
+    on_table = dropped.options.on_table
+    if on_table is False:
+        return None
+    aside = rng.spawn(1)[0]  # the points of a mesh without a table stay as they are
+    sample, _ = uniform_points(*mending.arrays(mesh), TABLE_SAMPLES, aside)
+    place = standing.found(sample, on_table, str(dropped.path), aside)
+    if place is not None and on_table is None:
+        raise PipelineError(
+            f"{dropped.path}: expected a container alone, found it on a plane much larger than itself; write `on_table: true` into "
+            "scan.yaml beside it to have that cut away, or `on_table: false` if it is part of the container"
+        )
+    return place
 
 
 def _from_points(dropped: DroppedMesh, rng: np.random.Generator) -> tuple[Mesh, np.ndarray, dict[str, Any]]:
@@ -67,7 +83,7 @@ def _from_points(dropped: DroppedMesh, rng: np.random.Generator) -> tuple[Mesh, 
     raw.refuse(options, dropped.path.parent / "scan.yaml", "a point cloud", wall_mm=reason)
     points, normals = clouds.read(dropped.path)
     points = points * (options.unit_m or 1.0)
-    _check_size(points, dropped.path)
+    _check_size(points, dropped)
     up, place = options.up or "z", standing.found(points, options.on_table, file, rng)
     T_object_world = upright(points, up)
     if place is not None:
@@ -153,18 +169,28 @@ def holds(mesh: Mesh) -> bool:
     return True
 
 
-def _check_size(vertices_m: np.ndarray, path: Path) -> None:
+def _check_size(vertices_m: np.ndarray, dropped: DroppedMesh) -> None:
     size = float(np.ptp(vertices_m, axis=0).max())
-    if size > LARGEST_M:
+    path, file = dropped.path, dropped.path.parent / "scan.yaml"
+    largest = LARGEST_M if dropped.options.unit_m else LARGEST_UNTOLD_M
+    if size > largest:
         raise PipelineError(
-            f"{path}: expected a container of at most {LARGEST_M:g} m, found one of {size:.3g} m; "
-            f"looks like millimetres: write `units: mm` into {path.parent / 'scan.yaml'}"
+            f"{path}: expected a container of at most {largest:g} m, found one of {size:.3g} m; {_cure(size)} into {file}"
         )
     if size < SMALLEST_M:
         raise PipelineError(
             f"{path}: expected a container of at least {SMALLEST_M * 1e3:g} mm, found one of {size * 1e3:.3g} mm; "
-            f"correct `units` in {path.parent / 'scan.yaml'} (m, cm or mm)"
+            f"correct `units` in {file} (m, cm or mm)"
         )
+
+
+def _cure(size: float) -> str:
+    """Return what to do with a mesh of `size` where metres were expected."""
+    if size > LEAST_IN_MM:
+        return "looks like millimetres: write `units: mm`"
+    if size > LARGEST_M:
+        return "looks like centimetres or inches: write `units: cm` (inches: times 2.54 before)"
+    return "scale it to its true size, or, if it is that large, write `units: m`"
 
 
 def _rotation(up: str) -> np.ndarray:

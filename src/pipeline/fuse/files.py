@@ -16,10 +16,10 @@ INVALID = 65535  # 7-Scenes' mark of a pixel without depth
 INTRINSICS = ("camera-intrinsics.txt", "camera_intrinsics.txt", "camera_intrinsic.json", "intrinsics.txt")
 
 
-def text(path: Path, what: str) -> str:
-    """Return the content of a text file."""
+def text(path: Path, what: str, cure: str = "add it") -> str:
+    """Return the content of a text file; `cure`: what to do where there is none."""
     if not path.is_file():
-        raise PipelineError(f"{path}: expected {what}, found no such file; add it")
+        raise PipelineError(f"{path}: expected {what}, found no such file; {cure}")
     try:
         if path.stat().st_size > MOST_BYTES:
             raise PipelineError(
@@ -42,9 +42,9 @@ def content(path: Path, what: str) -> Any:
         ) from error
 
 
-def rows(path: Path, what: str) -> list[list[str]]:
-    """Return the words of each line that is neither empty nor a comment."""
-    lines = (line.split("#")[0].replace(",", " ").split() for line in text(path, what).splitlines())
+def rows(path: Path, what: str, cure: str = "add it") -> list[list[str]]:
+    """Return the words of each line that is neither empty nor a comment; `cure`: what to do where there is no file."""
+    lines = (line.split("#")[0].replace(",", " ").split() for line in text(path, what, cure).splitlines())
     return [words for words in lines if words]
 
 
@@ -69,9 +69,9 @@ def numbers(values: Any, shape: tuple[int, ...], where: str, what: str) -> np.nd
     return array.reshape(shape)
 
 
-def matrix(path: Path, size: int, what: str) -> np.ndarray:
-    """Return the matrix (size, size) in a text file."""
-    return numbers(rows(path, f"{what} ({size}×{size} numbers)"), (size, size), str(path), what)
+def matrix(path: Path, size: int, what: str, cure: str = "add it") -> np.ndarray:
+    """Return the matrix (size, size) in a text file; `cure`: what to do where there is none."""
+    return numbers(rows(path, f"{what} ({size}×{size} numbers)", cure), (size, size), str(path), what)
 
 
 def intrinsics(folder: Path) -> tuple[np.ndarray, Path]:

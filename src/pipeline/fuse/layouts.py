@@ -42,7 +42,9 @@ def read(folder: Path) -> Views | DroppedMesh:
     if layouts or dropped:
         both = [f"images ({layout})" for layout in layouts] + dropped
         shown = f"{' and '.join(both[:4])}: more than one scan"
-    raise PipelineError(f"{folder}: expected {_EXPECTED}; found {shown}; keep one scan a folder")
+    raise PipelineError(
+        f"{folder}: expected {_EXPECTED}; found {shown}; keep one scan a folder, in one of these formats"
+    )
 
 
 def _names(folder: Path) -> list[str]:

@@ -25,7 +25,8 @@ def frames(folder: Path, names: list[str], options: Options) -> list[Frame]:
         T = None
         if posed:
             path = folder / f"{stem}pose.txt"
-            T = files.pose(files.matrix(path, 4, "the pose camera→world"), options.unit_m or 1.0, str(path))
+            given = files.matrix(path, 4, "the pose camera→world", cure="add it or remove the frame")
+            T = files.pose(given, options.unit_m or 1.0, str(path))
         image = colour(folder, f"{stem}color") or colour(folder, f"{stem}rgb")
         found.append(Frame(folder / name, K, str(where_K), options.depth_scale or 1000.0, T, image))
     return found
