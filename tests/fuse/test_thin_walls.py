@@ -151,6 +151,7 @@ def test_what_was_not_seen_at_all_is_named():
     assert len(told) == 2
     assert "floor was not seen at all" in told[0]
     assert "inner wall was poorly seen, 30%" in told[1]
+    assert "look from more sides" in told[1]
 
 
 def test_an_object_without_an_inside_is_named_in_one_sentence():

@@ -76,7 +76,9 @@ def _poor(shares: dict[str, float | None]) -> list[str]:
         if share is None:
             told.append(f"the {what} was not seen at all: dark or shiny, or no view from high enough")
         elif share < POOR:
-            told.append(f"the {what} was poorly seen, {share:.0%} of it; the rest is closed by guess")
+            told.append(
+                f"the {what} was poorly seen, {share:.0%} of it; the rest is closed by guess: look from more sides, or from higher"
+            )
     return told
 
 
