@@ -8,7 +8,7 @@ import trimesh
 from fuse import writers
 
 from pipeline.errors import PipelineError
-from pipeline.fuse import layouts, placement
+from pipeline.fuse import layouts, placement, posing, recorded
 from pipeline.geometry import frames
 from pipeline.scan import camera, recording
 from pipeline.scan.shapes import shape
@@ -23,16 +23,25 @@ def box(x: float, y: float, size=(0.06, 0.06, 0.08), bottom: float = recording.T
     return body.vertices + [x, y, bottom + size[2] / 2], body.faces
 
 
-def found(folder, *others, hide=None, table: bool = True, n: int = 12):
-    """Record the cup and others on the table, and return the table and the placement that fuse finds."""
+ROOM = [
+    box(0.0, 0.9, (4.0, 0.1, 3.0), 0.0),
+    box(-0.9, 0.0, (0.1, 4.0, 3.0), 0.0),
+    box(0, 0, (6.0, 6.0, 0.1), -0.1),
+]
+
+
+def found(folder, *others, hide=None, held=(), table: bool = True, n: int = 12):
+    """Record the cup and others on the table, `held` in every second view; return the table and the placement that fuse finds."""
     cup = frames.apply(T_WORLD_OBJECT, CUP.vertices_m), CUP.triangles
     scene = camera.Scene([cup, *([recording.table()] if table else []), *others])
+    other_scene = camera.Scene([cup, recording.table(), *others, *held]) if held else scene
     target = T_WORLD_OBJECT[:3, 3] + [0, 0, 0.03]
-    recorded = []
+    images = []
     for i, T in enumerate(camera.turntable(n, target, 0.6)):
-        depth = camera.depth_image(scene, T, camera.Noise(1.0), np.random.default_rng(i))
-        recorded.append((depth if hide is None else hide(i, depth), T))
-    writers.seven_scenes(folder, recorded)
+        shown = other_scene if i % 2 else scene
+        depth = camera.depth_image(shown, T, camera.Noise(1.0), np.random.default_rng(i))
+        images.append((depth if hide is None else hide(i, depth), T))
+    writers.seven_scenes(folder, images)
     return placement.find(layouts.read(folder), str(folder), np.random.default_rng(3))
 
 
@@ -51,12 +60,7 @@ def check_cup(place) -> None:
 
 def test_clutter_further_away_and_the_room_behind_are_cut_away(tmp_path):
     clutter = [box(0.30, 0.05), box(-0.25, 0.2, (0.1, 0.1, 0.2)), box(0.05, -0.33, (0.2, 0.05, 0.1))]
-    room = [
-        box(0.0, 0.9, (4.0, 0.1, 3.0), 0.0),
-        box(-0.9, 0.0, (0.1, 4.0, 3.0), 0.0),
-        box(0, 0, (6.0, 6.0, 0.1), -0.1),
-    ]
-    _, place = found(tmp_path, *clutter, *room)
+    _, place = found(tmp_path, *clutter, *ROOM)
     check_cup(place)
 
 
@@ -70,6 +74,13 @@ def test_a_hand_in_some_views_is_not_part_of_the_object(tmp_path):
         return depth
 
     _, place = found(tmp_path, hide=hand)
+    check_cup(place)
+
+
+def test_a_gripper_in_half_of_the_views_is_not_part_of_the_object(tmp_path):
+    """Held above the cup: what is left of it made a turntable of the cup."""
+    gripper = box(0.02, -0.03, (0.03, 0.03, 0.2), recording.TABLE_HEIGHT_M + 0.1)
+    _, place = found(tmp_path, *ROOM, held=[gripper])
     check_cup(place)
 
 
@@ -121,12 +132,24 @@ def test_an_object_on_a_turntable_stands_on_it(tmp_path):
     check_cup(place)
 
 
-def test_an_object_on_a_board_of_markers_stands_on_it(tmp_path):
-    """A board of 5 mm is lower than what counts as an object, and is none of it."""
-    board = box(0.03, -0.02, (0.24, 0.2, 0.005), recording.TABLE_HEIGHT_M - 0.005)
+@pytest.mark.parametrize("width_m", [0.2, 0.09])
+def test_an_object_on_a_board_of_markers_stands_on_it(tmp_path, width_m):
+    """A board of 5 mm is lower than what counts as an object, and is none of it; beside a narrow one more of the table is seen."""
+    board = box(0.02, -0.03, (0.28, width_m, 0.005), recording.TABLE_HEIGHT_M - 0.005)
     lower = box(0.0, 0.0, (0.9, 0.9, 0.02), recording.TABLE_HEIGHT_M - 0.025)
     plane, place = found(tmp_path, board, lower, table=False)
     assert plane.offset_m == pytest.approx(-recording.TABLE_HEIGHT_M, abs=0.0007)
+    check_cup(place)
+    views = layouts.read(tmp_path)
+    assert posing.off_m(views, place) < posing.OFF_M
+    on_board = recorded.Located(views, plane, place, [], {})
+    assert on_board.spread_m < 0.0015
+
+
+def test_a_book_beside_the_object_does_not_carry_it(tmp_path):
+    book = box(0.14, -0.03, (0.14, 0.2, 0.006))
+    plane, place = found(tmp_path, book)
+    assert plane.offset_m == pytest.approx(-recording.TABLE_HEIGHT_M, abs=0.0005)
     check_cup(place)
 
 

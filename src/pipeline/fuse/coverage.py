@@ -12,14 +12,14 @@ RIM_M = 0.004  # from the edge between inside and outside, as everywhere
 FLOOR_COSINE = 0.7  # what faces up within 45° is floor
 MUCH_THICKENED = 0.01  # of the outside: is named
 POOR = 0.8  # a part of which less was seen is named
-GUESSED = 0.3  # of the inner wall or of the floor: with less of it the capacity is unknown
+GUESSED = 0.3  # of the inner wall or of the floor: with less of it seen the capacity is a guess
 NO_INSIDE = (
-    "no inside that is open upwards was seen: it has a lid, lies on its side or stands upside down, or no view looked in; "
-    "stand it upright and open, and look from above 60°"
+    "no inside that is open upwards was seen: it has a lid, lies on its side or stands upside down, its inside is dark or shiny, "
+    "or no view looked in; stand it upright and open, and look from above 60°"
 )
 BLIND = (
-    "its capacity is a guess, as hardly any view looked in; look from above 60° or, where the neck is too narrow for that, "
-    "drop a mesh of it with its inside"
+    "its capacity is a guess, as too little of its inside was seen; look from above 60°, make it matt where it is dark, shiny or "
+    "clear, or, where the neck is too narrow to look in, drop a mesh of it with its inside"
 )
 
 

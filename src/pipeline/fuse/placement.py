@@ -32,8 +32,9 @@ OTHERS = 12  # views that are asked whether they look through a point
 # What is nearer together is one thing; in a single view its own shadow lies between its parts.
 GAP_M, SHADOW_M = 0.016, 0.12
 AROUND_M = 0.15  # the table is fitted again this far around the object: depth cameras bend large planes
-# Beside the object lies a board when its top is between these heights above the table; a higher one is a platter.
-BESIDE_M, LEAST_BOARD_M, MOST_BOARD_M = 0.03, 0.002, 0.012
+# A board under the object: between these heights above the table (a higher one is a platter), on so much of the table this far
+# around the object, and in directions from it that leave no larger gap.
+BESIDE_M, LEAST_BOARD_M, MOST_BOARD_M, BOARD_SHARE, MOST_OPEN_RAD = 0.03, 0.002, 0.012, 0.2, 0.75 * np.pi
 _ASKED = 300_000  # points at most tell heights, noise, and what is below the table: every so many
 _COMPARED = 5_000  # points of each of two objects
 _HITS_OF_NOISE = 3  # stray pixels hit a cell once or twice; a cell of the object is hit by many views
@@ -82,11 +83,7 @@ def find(views: Views, name: str, rng: np.random.Generator) -> tuple[Plane, Plac
     for plane in table.planes(near.places_m, eyes, name, rng):
         try:
             first = place(some, _above(near, plane, views), plane, middle, views, name)
-            platter_m, board_m = _platter_m(first), _board_m(some, plane, first)
-            plane = Plane(plane.normal, plane.offset_m - (platter_m or board_m), plane.rms_m)
-            plane = _locally(
-                some, plane, first, eyes, platter_m is not None, BESIDE_M if board_m else AROUND_M
-            )
+            plane = _under(some, plane, first, eyes)
             return plane, place(some, _above(near, plane, views), plane, middle, views, name)
         except NoObject as failure:
             failures.append(failure)
@@ -177,33 +174,44 @@ def _platter_m(placement: Placement) -> float | None:
     return float(np.median(z[np.abs(z - height) < FLAT_M]))
 
 
-def _board_m(points_m: np.ndarray, plane: Plane, placement: Placement) -> float:
-    """Return the height of what lies flat beside the object on all sides, such as a board of markers; 0 when it is the table."""
+def _under(points_m: np.ndarray, plane: Plane, placement: Placement, eyes: np.ndarray) -> Plane:
+    """Return what the object stands on, fitted to the points near it: a platter, a board, or the table, which is not quite flat."""
     x, y, z = frames.apply(placement.T_object_world, points_m).T
-    beside = placement.beside(x, y, BESIDE_M) & (np.abs(z) < MOST_BOARD_M)
-    if np.count_nonzero(beside) < LEAST_POINTS:
-        return 0.0
-    height_m = float(np.median(z[beside]))
-    flat = np.mean(np.abs(z[beside] - height_m) < FLAT_M) > FLAT_SHARE
-    return height_m if flat and height_m > LEAST_BOARD_M else 0.0
-
-
-def _locally(
-    points_m: np.ndarray,
-    plane: Plane,
-    placement: Placement,
-    eyes: np.ndarray,
-    on_it: bool,
-    reach_m: float,
-) -> Plane:
-    """Return the plane fitted again to the table so far around the object, or to the base that it stands on."""
-    x, y, _ = frames.apply(placement.T_object_world, points_m).T
-    if on_it:
-        return table.refined(points_m[placement.covers(x, y)], plane.normal, plane.offset_m, eyes)
-    around = placement.beside(x, y, reach_m)
-    if np.count_nonzero(around) < LEAST_POINTS:
+    raised_m = _platter_m(placement)
+    if raised_m is not None:
+        near = np.flatnonzero(placement.covers(x, y))
+    else:
+        near_table = np.flatnonzero(placement.beside(x, y, AROUND_M))
+        raised_m, near = _board(x, y, z, placement) or (0.0, near_table)
+    plane = Plane(plane.normal, plane.offset_m - raised_m, plane.rms_m)
+    if len(near) < LEAST_POINTS:
         return plane
-    return table.refined(points_m[around], plane.normal, plane.offset_m, eyes)
+    return table.refined(points_m[near], plane.normal, plane.offset_m, eyes)
+
+
+def _board(
+    x_m: np.ndarray, y_m: np.ndarray, z_m: np.ndarray, placement: Placement
+) -> tuple[float, np.ndarray] | None:
+    """Return the height of a board under the object, such as one of markers, and which points are on it (M,); or None.
+
+    It is flat, and seen beyond the object on opposite sides: what lies beside it carries nothing.
+    """
+    beside = np.flatnonzero(placement.beside(x_m, y_m, BESIDE_M) & (np.abs(z_m) < MOST_BOARD_M))
+    if len(beside) < LEAST_POINTS:
+        return None
+    height_m = table.local_heights(x_m[beside], y_m[beside], z_m[beside])
+    raised = height_m > LEAST_BOARD_M
+    if np.mean(raised) < BOARD_SHARE:
+        return None
+    top_m = float(np.median(height_m[raised]))
+    on_top = np.abs(height_m - top_m) < FLAT_M / 2
+    board = beside[on_top]
+    far = board[~placement.beside(x_m[board], y_m[board], BESIDE_M / 2)]
+    if np.count_nonzero(on_top) < FLAT_SHARE * np.count_nonzero(raised) or not len(far):
+        return None
+    angle = np.sort(np.arctan2(y_m[far], x_m[far]))
+    open_rad = float(np.diff(np.append(angle, angle[0] + 2 * np.pi)).max())
+    return (top_m, board) if open_rad < MOST_OPEN_RAD else None
 
 
 def table_frame(plane: Plane) -> np.ndarray:

@@ -26,7 +26,7 @@ HELD_M2 = 0.05
 
 def off_m(views: Views, place: Placement) -> float:
     """Return how far the poses are off by the heights of the table around the object: root mean square over the views."""
-    points, view = _table(views, place, MEDIUM)
+    points, view = ground(views, place, MEDIUM)
     shown = [points[view == i, 2] for i in range(len(views.depths_m))]
     heights_m = [float(z[np.abs(z - np.median(z)) < ALIKE_M].mean()) for z in shown if len(z) >= LEAST_POINTS]
     return float(np.sqrt(np.mean(np.square(heights_m)))) if heights_m else 0.0
@@ -40,7 +40,7 @@ def refined(
     And the names of those that do not show the object, which are left out. Turns that nothing determines stay as given. None where
     the views do not tell how their poses are off.
     """
-    points, view = _table(views, place, FINE)
+    points, view = ground(views, place, FINE)
     stood = []
     for i, T_world_camera in enumerate(views.T_world_cameras):
         T_level_world = _upright(points[view == i]) @ place.T_object_world
@@ -79,12 +79,14 @@ def shown_again(views: Views, place: Placement) -> Placement:
     return replace(place, points_m=places.T[own])
 
 
-def _table(views: Views, place: Placement, stride: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the points (N, 3) of the table around the object, its frame, and the number of the view (N,) that each is from."""
+def ground(views: Views, place: Placement, stride: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the points (N, 3) of what the object stands on, around it, its frame, and the view (N,) that each is from."""
     points = table.world_points(views, stride)
     places = frames.apply(place.T_object_world, points.places_m)
     x, y, z = places.T
-    near = place.beside(x, y, AROUND_M) & (np.abs(z) < NEAR_M)
+    near = np.flatnonzero(place.beside(x, y, AROUND_M) & (np.abs(z) < NEAR_M))
+    if len(near):  # what is elsewhere by all views is beside a board, or clutter
+        near = near[np.abs(table.local_heights(x[near], y[near], z[near])) < ALIKE_M]
     return places[near], points.view[near]
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.errors import PipelineError
-from pipeline.fuse import agreement, placement, posing, registration, table
+from pipeline.fuse import agreement, placement, posing, registration
 from pipeline.fuse.raw import Views
 from pipeline.fuse.table import Placement, Plane
 
@@ -31,7 +31,7 @@ class Located:
     @property
     def spread_m(self) -> float:
         """The noise of depth, from the table."""
-        return placement.spread_m(self.plane.height(table.world_points(self.views, posing.COARSE).places_m))
+        return placement.spread_m(posing.ground(self.views, self.placement, posing.MEDIUM)[0][:, 2])
 
     def facts(self) -> dict[str, Any]:
         """Return what fusion.json says of the scan."""

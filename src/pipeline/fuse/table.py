@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import ndimage
 
 from pipeline.errors import PipelineError
 from pipeline.fuse.agreement import unprojected
@@ -76,6 +77,14 @@ class Points:
 def thinned(values: np.ndarray, most: int) -> np.ndarray:
     """Return every k-th of the rows: as many as possible, `most` at most."""
     return values[:: -(-len(values) // most) or 1]
+
+
+def local_heights(x_m: np.ndarray, y_m: np.ndarray, z_m: np.ndarray) -> np.ndarray:
+    """Return for each of the points (N,) the median height of those around it: steps of a table without the noise of depth."""
+    column = np.floor(np.stack([x_m, y_m], axis=1) / (2 * CELL_M)).astype(int)
+    column -= column.min(axis=0)
+    cell = np.unique(column @ [1, column[:, 0].max() + 1], return_inverse=True)[1]
+    return np.asarray(ndimage.median(z_m, cell, np.arange(cell.max() + 1)))[cell]
 
 
 def world_points(views: Views, stride: int = _STRIDE) -> Points:
