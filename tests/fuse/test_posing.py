@@ -66,3 +66,10 @@ def test_what_a_view_shows_of_the_table_stands_it_upright():
 def test_depth_too_noisy_for_walls_is_named(spread_m, told):
     found = recorded.complaints({"poses": "given", "poses_off_m": 0.0, "table_spread_m": spread_m})
     assert sum("noisy" in sentence and "3.3 mm" in sentence for sentence in found) == told
+
+
+def test_poses_that_could_not_be_refined_are_named_and_not_taken_for_noise():
+    found = recorded.complaints({"poses": "given", "poses_off_m": 0.0031, "table_spread_m": 0.0027})
+    assert len(found) == 1
+    assert "off by 3.1 mm" in found[0]
+    assert "fused as given" in found[0]

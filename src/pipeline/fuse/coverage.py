@@ -14,8 +14,8 @@ MUCH_THICKENED = 0.01  # of the outside: is named
 POOR = 0.8  # a part of which less was seen is named
 GUESSED = 0.3  # of the inner wall or of the floor: with less of it seen the capacity is a guess
 NO_INSIDE = (
-    "no inside that is open upwards was seen: it has a lid, lies on its side or stands upside down, its inside is dark or shiny, "
-    "or no view looked in; stand it upright and open, and look from above 60°"
+    "no inside that is open upwards was seen: it is dark or shiny, no view looked in, or the object has a lid, lies on its side or "
+    "stands upside down; stand it upright and open, and look from above 60°"
 )
 BLIND = (
     "its capacity is a guess, as too little of its inside was seen; look from above 60°, make it matt where it is dark, shiny or "

@@ -57,12 +57,20 @@ class Located:
 def complaints(facts: dict[str, Any]) -> list[str]:
     """Return a sentence when the given poses do not fit together well, and one when depth is too noisy for walls."""
     told = []
-    if facts["poses"] == "refined":
-        told.append(
-            f"the poses are off by {1e3 * facts['poses_off_m']:.1f} mm, by the table in each view; they were refined on table and "
-            "object; calibrate the camera's pose better"
+    off_m, as_given = facts["poses_off_m"] or 0.0, facts["poses"] == "given"
+    if off_m > posing.OFF_M:
+        done = (
+            "fused as given, as too little is seen to refine them"
+            if as_given
+            else "refined on table and object"
         )
-    if facts["table_spread_m"] > NOISY_M:
+        told.append(
+            f"the poses are off by {1e3 * off_m:.1f} mm, by the table in each view; they were {done}; "
+            "calibrate the camera's pose better"
+        )
+    if facts["table_spread_m"] > NOISY_M and not (
+        told and as_given
+    ):  # else it is the poses that spread the points
         told.append(
             f"depth is noisy: points of the table spread by {1e3 * facts['table_spread_m']:.1f} mm, which tears thin walls; "
             "record from nearer, more views, or the mean of several images a view"
