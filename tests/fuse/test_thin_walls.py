@@ -170,6 +170,17 @@ def test_a_depth_that_no_view_saw_is_a_guess():
     assert "capacity is a guess" in told[1]
 
 
+def test_what_stands_on_nothing_that_was_seen_is_said():
+    """A tray on a stand of glass: all round the table is seen through below it."""
+    tray = SimpleNamespace(name="tray", height_m=0.09, **block((0.1, 0.1, 0.03)))
+    tray.vertices_m = tray.vertices_m + [0.0, 0.0, 0.06]
+    surface, _ = fused(scenes.views(tray, 24)[0])
+    lowest_m = surface.vertices_m[:, 2].min()
+    assert 0.02 < lowest_m < 0.061  # what no view saw below it is solid
+    assert f"between the table and {1e3 * lowest_m:.0f} mm" in coverage.complaints({}, 0.0, lowest_m)[0]
+    assert coverage.complaints({}, 0.0, 0.001) == []
+
+
 def block(size_m: tuple[float, float, float]) -> dict[str, np.ndarray]:
     mesh = trimesh.creation.box(size_m)
     return {"vertices_m": mesh.vertices + [0, 0, size_m[2] / 2], "triangles": mesh.faces}

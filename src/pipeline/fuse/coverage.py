@@ -13,6 +13,7 @@ FLOOR_COSINE = 0.7  # what faces up within 45° is floor
 MUCH_THICKENED = 0.01  # of the outside: is named
 POOR = 0.8  # a part of which less was seen is named
 GUESSED = 0.3  # of the inner wall or of the floor: with less of it seen the capacity is a guess
+FLOATS_M = 0.005  # above the table: what a foot's shadow and noise leave open is less
 NO_INSIDE = (
     "no inside that is open upwards was seen: it is dark or shiny, no view looked in, or the object has a lid, lies on its side or "
     "stands upside down; stand it upright and open, and look from above 60°"
@@ -53,8 +54,10 @@ def shares_seen(surface: Surface) -> dict[str, float | None]:
     return shares
 
 
-def complaints(shares: dict[str, float | None], thickened_share: float = 0.0) -> list[str]:
-    """Return one sentence for each part that was poorly seen or not at all, and one for a wall that had to be thickened."""
+def complaints(
+    shares: dict[str, float | None], thickened_share: float = 0.0, lowest_m: float = 0.0
+) -> list[str]:
+    """Return a sentence for each part that was poorly seen or not at all, a wall that was thickened, a foot that is missing."""
     inside = [shares.get("inner_wall"), shares.get("floor")]
     told = [NO_INSIDE] if shares and inside == [None, None] else _poor(shares)
     if any(share is not None and share < GUESSED for share in inside):
@@ -63,6 +66,11 @@ def complaints(shares: dict[str, float | None], thickened_share: float = 0.0) ->
         told.append(
             f"the wall is too thin for this camera: {thickened_share:.0%} of the outside was moved to be "
             f"{walls.LEAST_WALL_M * 1e3:.1f} mm from the inside"
+        )
+    if lowest_m > FLOATS_M:
+        told.append(
+            f"nothing of it was seen between the table and {lowest_m * 1e3:.0f} mm above: its foot is clear, dark or shiny, or it "
+            "stands on something that is; heights are counted from the table"
         )
     return told
 

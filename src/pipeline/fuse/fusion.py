@@ -69,7 +69,8 @@ def fused(
         "floor_closed_by_table_m2": surface.table_closed_m2,
         "wall_thickened_share": surface.thickened_share,
     }
-    told = recorded.complaints(facts) + coverage.complaints(shares, surface.thickened_share)
+    lowest_m = float(surface.vertices_m[:, 2].min())
+    told = recorded.complaints(facts) + coverage.complaints(shares, surface.thickened_share, lowest_m)
     return replace(_result(surface, n_points, True, rng, facts), complaints=tuple(told))
 
 
