@@ -93,7 +93,7 @@ FORMS = (
     ),
     # Measurements of minutes, and what installs: no test runs these as they are printed.
     Form(
-        r"python benchmarks/(fusion|poses|bullet|engines|primitives|conditioned|watching|parameters|splash)\.py.*",
+        r"python benchmarks/(fusion|poses|arcs|bullet|engines|primitives|conditioned|watching|parameters|splash)\.py.*",
         looked_up,
         None,
     ),

@@ -1,11 +1,14 @@
-"""Cups of any wall on a table, scanned in memory: for tests of thin walls and for `benchmarks/fusion.py`."""
+"""Cups of any wall on a table, scanned in memory: for tests of thin walls, and for `benchmarks/fusion.py` and `arcs.py`."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 
 from pipeline.fuse.raw import Options, Views
+from pipeline.geometry import frames
 from pipeline.scan import camera, recording
+from pipeline.scan.shapes import shape
 
 SEED, DISTANCE_M = 1, 0.6
 
@@ -27,3 +30,19 @@ def views(body: SimpleNamespace, n: int = 36, noise: float = 1.0) -> tuple[Views
         n_found=n,
     )
     return found, T_world_object
+
+
+def of_one_side(name: str, towards_deg: float, arc_deg: float, n: int = 48) -> Views:
+    """Return those of n views of a demonstration object that are from around one direction of its frame; its handle is at 0°."""
+    all_round, T_world_object = views(shape(name), n)
+    eyes = [frames.apply(frames.inverse(T_world_object), T[:3, 3]) for T in all_round.T_world_cameras]
+    off = [(np.degrees(np.arctan2(y, x)) - towards_deg + 180) % 360 - 180 for x, y, _ in eyes]
+    kept = np.flatnonzero(np.abs(off) <= arc_deg / 2)
+    return replace(
+        all_round,
+        depths_m=[all_round.depths_m[i] for i in kept],
+        T_world_cameras=[all_round.T_world_cameras[i] for i in kept],
+        intrinsics=all_round.intrinsics[kept],
+        names=[all_round.names[i] for i in kept],
+        n_found=len(kept),
+    )

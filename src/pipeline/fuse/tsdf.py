@@ -7,6 +7,7 @@ from scipy import ndimage
 
 from pipeline.errors import PipelineError
 from pipeline.fuse import measuring
+from pipeline.fuse.completion import completed
 from pipeline.fuse.layouts import Views
 from pipeline.fuse.planes import Planes, planes
 from pipeline.fuse.refinement import refined
@@ -57,10 +58,13 @@ def fuse(views: Views, placement: Placement, voxel_m: float, truncation_m: float
     truncation_m = min(truncation_m, max(LARGEST_TRUNCATION_M, 2 * voxel_m))
     lowest, covered = _box(placement, voxel_m)
     seen_by = planes(views, placement)
-    value = _field(seen_by, placement.points_m, lowest, covered, voxel_m, truncation_m)
+    value, measured = _field(seen_by, placement.points_m, lowest, covered, voxel_m, truncation_m)
     heights_m = (lowest[2] + np.arange(value.shape[2])) * voxel_m
     value -= np.float32(_excess_m(heights_m, voxel_m) / truncation_m)
     walled_in = enclosed(value > 0)
+    wider = completed(value, measured, walled_in, voxel_m, truncation_m)
+    if wider is not value:
+        value, walled_in = wider, enclosed(wider > 0)
     floor = _table_layers(voxel_m) - lowest[2]
     table_closed_m2 = float(walled_in[:, :, floor].sum()) * voxel_m**2
     value[:, :, floor][walled_in[:, :, floor]] = -1.0
@@ -88,8 +92,11 @@ def _field(
     covered: np.ndarray,
     voxel_m: float,
     truncation_m: float,
-) -> np.ndarray:
-    """Return the signed distance (nx, ny, nz) in truncations: unseen voxels are solid, beyond footprint, top and table is free."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the signed distance (nx, ny, nz) in truncations: unseen voxels are solid, beyond footprint, top and table is free.
+
+    And which voxels were seen.
+    """
     near = _near(points_m, lowest, covered, truncation_m, voxel_m)
     arrays = seen_by.plane, seen_by.view, seen_by.projection
     columns = np.argwhere(covered.any(axis=2))
@@ -98,7 +105,7 @@ def _field(
     value, weight = measuring.signed_distances(lowest, voxel_m, columns, layers, near, *arrays, truncation_m)
     value = regularised(value, weight)
     value[~covered] = 1.0
-    return value
+    return value, weight > 0
 
 
 def _box(placement: Placement, voxel_m: float) -> tuple[np.ndarray, np.ndarray]:
@@ -111,7 +118,9 @@ def _box(placement: Placement, voxel_m: float) -> tuple[np.ndarray, np.ndarray]:
     high = np.floor(placement.bounds_m[1] / edge).astype(int) + 1
     x, y, z = (np.arange(a * BLOCK, b * BLOCK) for a, b in zip(low, high, strict=True))
     footprint = placement.covers(*np.meshgrid(x * voxel_m, y * voxel_m, indexing="ij"))
+    footprint[[0, -1]] = footprint[:, [0, -1]] = False  # a surface that reached the border would be open there
     within = (z >= _table_layers(voxel_m)) & (z * voxel_m <= placement.bounds_m[1, 2])
+    within[-1] = False
     return low * BLOCK, footprint[..., None] & within
 
 

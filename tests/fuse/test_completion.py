@@ -1,0 +1,54 @@
+"""Views from one side alone: what they do not show of the inner wall is as far from the outer one as where both are seen."""
+
+import numpy as np
+import pytest
+from fuse import scenes
+from scipy import ndimage
+
+from pipeline.fuse import completion, tsdf
+from pipeline.fuse.placement import find
+from pipeline.geometry.cavity import cavity
+from pipeline.geometry.surface import is_closed
+from pipeline.scan.shapes import shape
+
+VOXEL_M, TRUNCATION_M = 0.00125, 0.0025
+
+
+def fused(views) -> tsdf.Surface:
+    """Return the surface of the views."""
+    _, place = find(views, "scan", np.random.default_rng(1))
+    return tsdf.fuse(views, place, VOXEL_M, TRUNCATION_M, "scan")
+
+
+@pytest.mark.parametrize(
+    ("name", "towards_deg", "arc_deg"), [("mug", 0, 180), ("mug", 180, 120), ("tall_cup", 90, 120)]
+)
+def test_what_is_not_seen_of_an_inner_wall_takes_no_room(name, towards_deg, arc_deg):
+    surface = fused(scenes.of_one_side(name, towards_deg, arc_deg))
+    room = cavity(surface.vertices_m, surface.triangles, name=name)
+    assert room.capacity_m3 == pytest.approx(shape(name).capacity_m3, rel=0.02)
+    assert is_closed(surface.triangles)
+    assert not surface.seen[surface.inner].all()
+
+
+def test_a_handle_is_not_hollowed_where_the_wall_behind_it_was_not_seen():
+    """A level of a cup, 4 voxels thick, half of it seen; in the other half the cavity is 8 too narrow, and there is a handle."""
+    x, y = np.meshgrid(np.arange(120) - 59.5, np.arange(120) - 59.5, indexing="ij")
+    r = np.hypot(x, y)
+    handle = (x > 0) & (x < 55) & (np.abs(y) < 7) & (r > 30)
+    room = r <= np.where(x < 0, 30, 22)
+    value = np.where(room | ((r > 34) & ~handle), 1.0, -1.0)
+    skin = ndimage.binary_dilation(value > 0, iterations=2) & ~((x >= 0) & (r < 32))
+    wider = completion._wider(value, skin | (value > 0), room, VOXEL_M, TRUNCATION_M / VOXEL_M) > 0
+    assert wider[r < 29].all()
+    assert not wider[(r > 31) & (r < 33) & ~handle].any()
+    assert not wider[handle & (r > 33)].any()  # its root, between the corners, is no part of the wall
+
+
+def test_what_was_seen_all_round_stays_as_it_is():
+    value = np.full((40, 40, 8), 1.0)
+    r = np.hypot(*np.meshgrid(np.arange(40) - 19.5, np.arange(40) - 19.5, indexing="ij"))
+    value[(r > 10) & (r < 14)] = -1.0
+    inside = np.repeat((r <= 10)[..., None], 8, axis=2)
+    everything = np.ones(value.shape, bool)
+    assert completion.completed(value, everything, inside, VOXEL_M, TRUNCATION_M) is value
