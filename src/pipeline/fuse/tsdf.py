@@ -118,7 +118,8 @@ def _box(placement: Placement, voxel_m: float) -> tuple[np.ndarray, np.ndarray]:
     high = np.floor(placement.bounds_m[1] / edge).astype(int) + 1
     x, y, z = (np.arange(a * BLOCK, b * BLOCK) for a, b in zip(low, high, strict=True))
     footprint = placement.covers(*np.meshgrid(x * voxel_m, y * voxel_m, indexing="ij"))
-    footprint[[0, -1]] = footprint[:, [0, -1]] = False  # a surface that reached the border would be open there
+    # A surface that reached the border would be open there.
+    footprint[[0, -1]] = footprint[:, [0, -1]] = False
     within = (z >= _table_layers(voxel_m)) & (z * voxel_m <= placement.bounds_m[1, 2])
     within[-1] = False
     return low * BLOCK, footprint[..., None] & within
