@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 from fuse import scenes
 from scipy import ndimage
 
@@ -23,11 +24,19 @@ def fused(views) -> tsdf.Surface:
 @pytest.mark.parametrize(
     ("name", "towards_deg", "arc_deg"), [("mug", 0, 180), ("mug", 180, 120), ("tall_cup", 90, 120)]
 )
-def test_what_is_not_seen_of_an_inner_wall_takes_no_room(name, towards_deg, arc_deg):
+def test_what_is_not_seen_of_a_wall_is_no_thicker_than_the_rest(name, towards_deg, arc_deg):
     surface = fused(scenes.of_one_side(name, towards_deg, arc_deg))
     room = cavity(surface.vertices_m, surface.triangles, name=name)
     assert room.capacity_m3 == pytest.approx(shape(name).capacity_m3, rel=0.02)
     assert is_closed(surface.triangles)
+    solid_m3, true_m3 = (
+        trimesh.Trimesh(*mesh).volume
+        for mesh in (
+            (surface.vertices_m, surface.triangles),
+            (shape(name).vertices_m, shape(name).triangles),
+        )
+    )
+    assert solid_m3 == pytest.approx(true_m3, rel=0.05)
     assert not surface.seen[surface.inner].all()
 
 
@@ -39,7 +48,9 @@ def test_a_handle_is_not_hollowed_where_the_wall_behind_it_was_not_seen():
     room = r <= np.where(x < 0, 30, 22)
     value = np.where(room | ((r > 34) & ~handle), 1.0, -1.0)
     skin = ndimage.binary_dilation(value > 0, iterations=2) & ~((x >= 0) & (r < 32))
-    wider = completion._wider(value, skin | (value > 0), room, VOXEL_M, TRUNCATION_M / VOXEL_M) > 0
+    seen = skin | (value > 0)
+    beyond = completion._beyond_wall_inside(value, seen, room, VOXEL_M)
+    wider = completion._opened(value, seen, beyond, room, TRUNCATION_M / VOXEL_M) > 0
     assert wider[r < 29].all()
     assert not wider[(r > 31) & (r < 33) & ~handle].any()
     assert not wider[handle & (r > 33)].any()  # its root, between the corners, is no part of the wall

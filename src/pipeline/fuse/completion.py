@@ -1,53 +1,93 @@
-"""What no view saw of a cavity's wall: taken to be as thick as the wall is where both its sides were seen."""
+"""What no view saw of a wall: taken to be as thick as the wall is where both its sides were seen."""
 
 import numpy as np
 from scipy import ndimage
 
 HANDLE_M = 0.025  # what stands off the body and is narrower in a level is no part of its wall
+OFF_M = 0.006  # what was seen so far off the wall is a handle: so much around it stays
 LEAST_UNSEEN = 0.05  # of the cavity's edge, over all levels; with less, what is unseen stays solid
 LEAST_EDGE = 12  # voxels of a level whose both sides were seen tell how thick the wall is there
+HALF = 0.5  # of a voxel: so much further than the last solid one's middle is the surface, in the mean
 _CROSS = ndimage.generate_binary_structure(2, 1)
 
 
 def completed(
     value: np.ndarray, measured: np.ndarray, walled_in: np.ndarray, voxel_m: float, truncation_m: float
 ) -> np.ndarray:
-    """Return the signed distances (nx, ny, nz) in truncations, positive in the open, with the cavity wider where it was not seen.
+    """Return the signed distances (nx, ny, nz) in truncations, positive in the open, with walls in place of what is in shadow.
 
     measured (nx, ny, nz): what some view saw. walled_in: the cavity. Level by level: unseen places that are deeper in the body than
-    its wall is thick, and can be reached from the cavity, are open. Nothing is seen there, so nothing contradicts it.
+    its wall is thick, and can be reached from the cavity, are open; then those that are further from the cavity than that, and can
+    be reached from outside, also below the cavity's floor. Nothing that was seen changes.
     """
     edge = ndimage.binary_dilation(walled_in, _CROSS[..., None]) & (value <= 0)
-    if np.count_nonzero(edge & ~measured) < LEAST_UNSEEN * np.count_nonzero(edge):
+    if np.count_nonzero(edge & ~measured) <= LEAST_UNSEEN * np.count_nonzero(edge):
         return value
     value = value.copy()
-    for z in np.flatnonzero(walled_in.any(axis=(0, 1))):
-        level = value[..., z], measured[..., z], walled_in[..., z]
-        value[..., z] = _wider(*level, voxel_m, truncation_m / voxel_m)
+    levels = np.flatnonzero(walled_in.any(axis=(0, 1)))
+    for z in levels[::-1]:  # down to the floor, whose level tells what is in shadow below
+        level, seen, room = value[..., z], measured[..., z], walled_in[..., z]
+        level = _opened(level, seen, _beyond_wall_inside(level, seen, room, voxel_m), room, truncation_m / voxel_m)
+        room = _connected(level > 0, room)
+        beyond = _beyond_wall_outside(level, seen, room, voxel_m)
+        outside = (level > 0) & ~room
+        value[..., z] = _opened(level, seen, beyond, outside, truncation_m / voxel_m)
+    for z in range(levels[0]):
+        level, seen = value[..., z], measured[..., z]
+        value[..., z] = _opened(level, seen, beyond, level > 0, truncation_m / voxel_m)
     return value
 
 
-def _wider(
-    value: np.ndarray, measured: np.ndarray, room: np.ndarray, voxel_m: float, truncation: float
+def _opened(
+    value: np.ndarray, measured: np.ndarray, beyond: np.ndarray, start: np.ndarray, truncation: float
 ) -> np.ndarray:
-    """Return the values (nx, ny) of a level with a wider cavity; the truncation in voxels."""
+    """Return the values (nx, ny) of a level, open where nothing was seen beyond the wall (in voxels), on ways from the start."""
+    unseen = (value <= 0) & ~measured
+    reached = ndimage.binary_dilation(_connected(start | (unseen & (beyond > 0)), start), _CROSS)
+    return np.where(unseen & reached, np.maximum(value, np.clip(beyond / truncation, -1.0, 1.0)), value)
+
+
+def _beyond_wall_inside(value: np.ndarray, measured: np.ndarray, room: np.ndarray, voxel_m: float) -> np.ndarray:
+    """Return how much deeper in the body than its wall is thick the voxels (nx, ny) of a level are, in voxels."""
     solid = value <= 0
-    body = _without_handles(ndimage.binary_fill_holes(solid | room), HANDLE_M / voxel_m / 2) | room
+    body = _without_handles(ndimage.binary_fill_holes(solid | room), voxel_m) | room
     depth, outside = ndimage.distance_transform_edt(body, return_indices=True)
-    outside_seen = ndimage.binary_dilation(solid & measured, iterations=2)[tuple(outside)]
-    edge = ndimage.binary_dilation(room, _CROSS) & solid & measured & outside_seen
+    edge = ndimage.binary_dilation(room, _CROSS) & solid & measured
+    return _beyond(depth, edge & _seen_at(solid & measured, outside))
+
+
+def _beyond_wall_outside(value: np.ndarray, measured: np.ndarray, room: np.ndarray, voxel_m: float) -> np.ndarray:
+    """Return how much further from the cavity than its wall is thick the voxels (nx, ny) are, in voxels; handles stay."""
+    solid = value <= 0
+    distance, inside = ndimage.distance_transform_edt(~room, return_indices=True)
+    body = _without_handles(solid | room, voxel_m)
+    edge = body & ~ndimage.binary_erosion(body, _CROSS) & measured
+    beyond = _beyond(distance, edge & _seen_at(solid & measured, inside))
+    handle = solid & measured & (beyond > OFF_M / voxel_m)
+    near = ndimage.distance_transform_edt(~handle) <= OFF_M / voxel_m if handle.any() else handle
+    return np.where(near, -np.inf, beyond)
+
+
+def _beyond(distance: np.ndarray, edge: np.ndarray) -> np.ndarray:
+    """Return the distances (nx, ny) less the thickness of the wall, which is theirs at its edge; without one, nothing is beyond."""
     if np.count_nonzero(edge) < LEAST_EDGE:
-        return value
-    beyond = depth - np.median(depth[edge])
-    labels, _ = ndimage.label(room | (solid & ~measured & (beyond > 0)), _CROSS)
-    reached = np.isin(labels, np.unique(labels[room]))
-    opened = solid & ~measured & ndimage.binary_dilation(reached, _CROSS)
-    return np.where(opened, np.maximum(value, np.clip(beyond / truncation, -1.0, 1.0)), value)
+        return np.full(distance.shape, -np.inf)
+    return distance - np.median(distance[edge]) - HALF
 
 
-def _without_handles(body: np.ndarray, radius: float) -> np.ndarray:
-    """Return what of a level's body (nx, ny) is wider than twice the radius, in voxels."""
+def _seen_at(seen: np.ndarray, nearest: np.ndarray) -> np.ndarray:
+    """Return whether something was seen (nx, ny) at the nearest places (2, nx, ny)."""
+    return ndimage.binary_dilation(seen, iterations=2)[tuple(nearest)]
+
+
+def _connected(wanted: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """Return which of the wanted places (nx, ny) of a level a way leads to from the start, which is among them."""
+    labels, _ = ndimage.label(wanted, _CROSS)
+    return np.isin(labels, np.unique(labels[start & wanted]))
+
+
+def _without_handles(body: np.ndarray, voxel_m: float) -> np.ndarray:
+    """Return what of a level's body (nx, ny) is wider than a handle."""
+    radius = HANDLE_M / voxel_m / 2
     core = ndimage.distance_transform_edt(np.pad(body, 1))[1:-1, 1:-1] > radius
-    if not core.any():
-        return body
-    return body & (ndimage.distance_transform_edt(~core) <= radius)
+    return body & (ndimage.distance_transform_edt(~core) <= radius) if core.any() else body
