@@ -96,7 +96,7 @@ def _fitted(
         return found, True
     raise PipelineError(
         f"{name}: expected a round object where turns of the views cannot be told, found {beyond:.1%} of what they show more than "
-        f"{BEYOND_M * 1e3:g} mm off one, as a small handle is; add poses, write `turntable_deg:` into scan.yaml, or record from nearer"
+        f"{BEYOND_M * 1e3:g} mm off one, as a small handle is; add poses, write `turntable_deg:` into scan.yaml, or go nearer"
     )
 
 
