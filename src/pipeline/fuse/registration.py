@@ -87,16 +87,19 @@ def _fitted(
     """
     if told >= TOLD:
         return fitted_to_surface(stood, poses, views, name, rng)[0], True
-    turned, surface = fitted_to_surface(stood, _all_round(stood, poses), views, name, rng)
-    beyond = _beyond(stood, turned, surface)
-    if beyond < MOST_BEYOND:
-        return turned, False
+    known = views.options.turntable_deg is not None
+    if not known:
+        turned, surface = fitted_to_surface(stood, _all_round(stood, poses), views, name, rng)
+        if (beyond := _beyond(stood, turned, surface)) < MOST_BEYOND:
+            return turned, False
     found, surface = fitted_to_surface(stood, poses, views, name, rng)
-    if _beyond(stood, found, surface) < MOST_BEYOND:
-        return found, True
+    if (off := _beyond(stood, found, surface)) < MOST_BEYOND:
+        return found, not known
+    cure = "correct `turntable_deg:` in scan.yaml" if known else "write `turntable_deg:` into scan.yaml"
+    off = off if known else beyond
     raise PipelineError(
-        f"{name}: expected a round object where turns of the views cannot be told, found {beyond:.1%} of what they show more than "
-        f"{BEYOND_M * 1e3:g} mm off one, as a small handle is; add poses, write `turntable_deg:` into scan.yaml, or go nearer"
+        f"{name}: expected a round object where turns of the views cannot be told, found {off:.1%} of what they show more than "
+        f"{BEYOND_M * 1e3:g} mm off one, as a small handle is; add poses, {cure}, or go nearer"
     )
 
 
