@@ -6,7 +6,7 @@ from fuse import writers
 from PIL import Image
 
 from pipeline.errors import PipelineError
-from pipeline.fuse import agreement, layouts, levelled, recorded
+from pipeline.fuse import agreement, layouts, levelled, recorded, registration
 from pipeline.geometry import frames
 from pipeline.scan import camera, recording
 from pipeline.scan.shapes import shape
@@ -130,7 +130,10 @@ def box(width_m: float, wide_m: float, high_m: float, at: tuple[float, float, fl
 
 def test_a_lug_that_tells_no_turns_is_not_lost(tmp_path):
     record(tmp_path, "small_cup", lug=[box(0.015, 0.010, 0.005, (0.034, 0.0, 0.05))])
-    with pytest.raises(PipelineError, match="more than 5 mm off one, as a small handle is; add poses"):
+    with pytest.raises(
+        PipelineError,
+        match="more than 5 mm off one, as a small handle is, or views that do not fit; add poses",
+    ):
         located(tmp_path)
 
 
@@ -148,3 +151,15 @@ def test_as_many_angles_as_views(tmp_path):
         PipelineError, match="turntable_deg: expected an angle for each of the 12 views, found 3"
     ):
         located(tmp_path)
+
+
+def test_views_of_things_of_different_widths_are_refused():
+    def view(number: int, width_m: float) -> levelled.Levelled:
+        points = np.array([[0.0, 0.0, 0.0], [width_m, 0.0, 0.0]])
+        return levelled.Levelled(number, points, np.zeros((2, 3)), np.zeros(2), np.eye(4))
+
+    names = [f"{i}.png" for i in range(10)]
+    with_handle, with_platter = ([view(i, 0.08 * (k if i % 2 else 1)) for i in range(10)] for k in (2, 4))
+    registration.check_alike(with_handle, names, "cup")
+    with pytest.raises(PipelineError, match=r"80 mm in \d.png and one as wide as 320 mm in \d.png"):
+        registration.check_alike(with_platter, names, "cup")

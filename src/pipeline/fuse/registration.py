@@ -46,6 +46,7 @@ MOST_LEFT_OUT = 0.2
 # Of the points of round objects 0.3 % are further than that from their surface, of bowls with beads on the rim as well; 2.5 % where
 # it lacks a handle of 14 mm.
 BEYOND_M, MOST_BEYOND = 0.005, 0.01
+MOST_WIDER = 3.0  # a pan is twice as wide where its handle is seen
 LEAST_PAINT = (
     0.15  # of pairs of points are unlike: where fewer are, it is shade, gloss and the camera's noise
 )
@@ -99,7 +100,7 @@ def _fitted(
     off = off if known else beyond
     raise PipelineError(
         f"{name}: expected a round object where turns of the views cannot be told, found {off:.1%} of what they show more than "
-        f"{BEYOND_M * 1e3:g} mm off one, as a small handle is; add poses, {cure}, or go nearer"
+        f"{BEYOND_M * 1e3:g} mm off one, as a small handle is, or views that do not fit; add poses, {cure}, or go nearer"
     )
 
 
@@ -131,9 +132,23 @@ def _levelled(views: Views, name: str, rng: np.random.Generator) -> tuple[list[L
             failures[views.names[i]] = failure
     if len(failures) > MOST_LEFT_OUT * len(views.depths_m):
         raise next(iter(failures.values()))
+    check_alike(stood, views.names, name)
     return sorted(
         stood, key=lambda view: (-round(view.lopsided_m / 0.005), abs(view.steepness - FIRST_STEEPNESS))
     ), list(failures)
+
+
+def check_alike(stood: list[Levelled], names: list[str], name: str) -> None:
+    """Refuse views that show things of such different widths that some must show the object with its turntable."""
+    widths_m = np.array([np.ptp(view.points_m[:, :2], axis=0).max() for view in stood])
+    order = np.argsort(widths_m)
+    narrow, wide = order[len(order) // 10], order[-1 - len(order) // 10]
+    least, most = (f"{1e3 * widths_m[k]:.0f} mm in {names[stood[k].number]}" for k in (narrow, wide))
+    if widths_m[wide] > MOST_WIDER * widths_m[narrow]:
+        raise PipelineError(
+            f"{name}: expected the same object in all views, found one as wide as {least} and one as wide as {most}, as with the "
+            "turntable under it; put it on a table without one, or add poses"
+        )
 
 
 def _is_painted(stood: list[Levelled]) -> bool:
