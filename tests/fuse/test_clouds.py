@@ -121,3 +121,46 @@ def test_wrong_arrays(tmp_path, arrays, words):
     (tmp_path / "cup").mkdir()
     np.savez(tmp_path / "cup/cup.npz", **arrays)
     refused(tmp_path / "cup", "cup.npz", *words)
+
+
+def test_points_that_mark_nothing_are_none(tmp_path):
+    places, _ = points(4000)
+    write(tmp_path / "cup.pcd", np.concatenate([places + [0.3, 0.0, 0.5], np.zeros((200, 3))]), None)
+    assert clouds.read(tmp_path / "cup.pcd")[0].min(axis=0)[2] > 0.4
+
+
+def test_normals_that_all_point_inwards_are_turned_round(monkeypatch):
+    places, normals = points()
+    faced, meshing = [], clouds._poisson
+    monkeypatch.setattr(
+        clouds, "_poisson", lambda where, facing: faced.append(facing) or meshing(where, facing)
+    )
+    for sign in (1.0, -1.0):
+        wrong = sign * (1.0 - 2.0 * (np.arange(20_000) % 25 == 0))[:, None]  # as on curved walls
+        monkeypatch.setattr(
+            clouds,
+            "_outwards",  # right where the table closes it
+            lambda where, axes, _, wrong=wrong: np.where(where[:, 2:] == 0, 1.0, wrong[: len(axes)]) * axes,
+        )
+        clouds.meshed(places, sign * normals, "cup.ply")
+    np.testing.assert_array_equal(*faced)
+
+
+def test_a_surface_that_balloons_beyond_the_points_is_refused():
+    places, _ = points()
+    vertices = CUP.vertices_m.copy()
+    vertices[vertices[:, 2].argmax(), 2] += 0.007
+    with pytest.raises(PipelineError, match="reaches 7 mm beyond them"):
+        clouds.check_bulge(vertices, places, 0.0015, "cup.ply")
+
+
+def test_a_gap_in_the_floor_is_said(tmp_path):
+    places, normals = points(20_000)
+    radius, height = np.hypot(*places[:, :2].T), places[:, 2]
+    told = []
+    for name, gap in (("whole", 0.0), ("gap", 0.018)):
+        kept = (radius > gap) | (height > 0.02)
+        write(tmp_path / name / "cup.ply", places[kept], normals[kept])
+        told.append(fused(tmp_path / name, **OPTIONS).complaints)
+    assert told[0] == ()
+    assert "the capacity is a guess" in told[1][0]

@@ -102,3 +102,33 @@ def test_same_mesh_same_cloud(tmp_path):
     cup = shape("small_cup")
     first, second = (drop(tmp_path / name, cup.vertices_m, cup.triangles).cloud for name in ("a", "b"))
     np.testing.assert_array_equal(artefacts.points(first), artefacts.points(second))
+
+
+def ball(radius_m: float, *centre_m: float) -> trimesh.Trimesh:
+    return trimesh.creation.icosphere(1, radius_m).apply_translation(centre_m)
+
+
+def with_pieces(folder, *pieces: trimesh.Trimesh):
+    cup = shape("small_cup")
+    whole = trimesh.util.concatenate([trimesh.Trimesh(cup.vertices_m, cup.triangles), *pieces])
+    return drop(folder, whole.vertices, whole.faces)
+
+
+def test_crumbs_of_a_scan_in_the_air_go(tmp_path):
+    result = with_pieces(
+        tmp_path, ball(0.002, 0.05, 0, 0.12), ball(0.001, 0, 0, 0.05), ball(0.003, 0.1, 0, -0.02)
+    )
+    assert result.report["mended"]["crumbs_dropped"] == 3
+    np.testing.assert_allclose(np.ptp(result.mesh[0], axis=0), [0.055, 0.055, 0.06], atol=1e-4)
+
+
+def test_small_pieces_that_reach_the_rest_stay(tmp_path):
+    beads = [ball(0.003, 0.0295 + 0.0055 * k, 0, 0.04) for k in range(4)]
+    result = with_pieces(tmp_path, *beads)
+    assert result.report["mended"]["crumbs_dropped"] == 0
+    assert np.ptp(result.mesh[0][:, 0]) == pytest.approx(0.0275 + 0.0295 + 3 * 0.0055 + 0.003, abs=1e-3)
+
+
+def test_another_thing_in_the_mesh_is_refused(tmp_path):
+    with pytest.raises(PipelineError, match=r"found something \d+ mm wide apart from it at \(.*remove it"):
+        with_pieces(tmp_path, ball(0.02, 0.1, 0, 0.02))

@@ -126,3 +126,33 @@ def test_two_scans_in_a_folder_are_refused(recorded, tmp_path):
     trimesh.creation.box([0.1] * 3).export(tmp_path / "cup.ply")
     with pytest.raises(PipelineError, match=r"found images \(bop\) and cup.ply: more than one scan"):
         layouts.read(tmp_path)
+
+
+def test_images_count_as_their_numbers_do(recorded, tmp_path):
+    writers.open3d(tmp_path, recorded * 2)
+    for path in (tmp_path / "depth").glob("*.png"):
+        path.rename(path.with_name(f"{int(path.stem)}.PNG"))
+    views = layouts.read(tmp_path)
+    assert views.names == [f"depth/{i}.PNG" for i in range(2 * len(recorded))]
+
+
+def test_text_from_windows_is_read(recorded, tmp_path):
+    writers.tum(tmp_path, recorded)
+    for path in (*tmp_path.glob("*.txt"), *tmp_path.glob("*.json")):
+        path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"\n", b"\r\n"))
+    assert len(layouts.read(tmp_path).T_world_cameras) == len(recorded)
+
+
+def test_a_scan_one_folder_too_deep_is_found(recorded, tmp_path):
+    writers.seven_scenes(tmp_path / "cup" / "Cup 1", recorded)
+    (tmp_path / "cup" / "__MACOSX").mkdir()
+    with pytest.raises(PipelineError, match="move what is in Cup 1/ one folder up"):
+        layouts.read(tmp_path / "cup")
+
+
+def test_images_of_another_format_are_shown(recorded, tmp_path):
+    writers.open3d(tmp_path, recorded)
+    for path in (tmp_path / "depth").glob("*.png"):
+        path.rename(path.with_suffix(".tif"))
+    with pytest.raises(PipelineError, match=r"found 00000\.tif; export them again"):
+        layouts.read(tmp_path)

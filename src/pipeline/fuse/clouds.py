@@ -11,6 +11,7 @@ from pipeline.errors import PipelineError
 from pipeline.fuse.wrapping import Mesh
 
 LEAST_POINTS, MOST_POINTS = 2000, 20_000_000
+MARK = 100  # points that are all the same mark pixels without depth, by zeros mostly
 FINEST = 110  # points along the longest side: more are averaged
 NEIGHBOURS = 16
 REACHES = (1.5, 2.0, 2.5, 3.0)  # spacings: what is further from every point can be passed
@@ -20,6 +21,8 @@ BASE_SHARE = 0.5  # of the footprint must be covered by points of the underside,
 DEPTH = 8  # of Poisson's octree
 # A sound surface passes by the points within this many spacings, and has points everywhere within so many.
 MOST_OFF, MOST_BARE, BARE = 1.0, 0.05, 4.0
+WIDE_GAP_M = 0.015  # is said: the surface bulges by a quarter of it; clouds without gaps have up to 0.012
+MOST_BULGE = 2.5  # spacings beyond the box of the points: sparse points of a lip let the surface balloon
 
 
 def read(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
@@ -29,11 +32,12 @@ def read(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
     if normals is not None:
         finite &= np.isfinite(normals).all(axis=1) & (np.linalg.norm(normals, axis=1) > 1e-9)
         normals = normals[finite] / np.linalg.norm(normals[finite], axis=1, keepdims=True)
-    points, index = np.unique(points[finite], axis=0, return_index=True)
+    points, index, times = np.unique(points[finite], axis=0, return_index=True, return_counts=True)
     if not LEAST_POINTS <= len(points) <= MOST_POINTS:
         raise PipelineError(
             f"{path}: expected {LEAST_POINTS} to {MOST_POINTS} different points, found {len(points)}; export the cloud again"
         )
+    points, index = points[times < MARK], index[times < MARK]
     return points, None if normals is None else normals[index]
 
 
@@ -104,7 +108,7 @@ def meshed(points: np.ndarray, normals: np.ndarray | None, file: str) -> tuple[M
     whole, axes = np.concatenate([points, base]), np.concatenate([normals, down])
     facing = _outwards(whole, axes, spacing)
     if given:  # all of them the same way round, or else as they are found to be
-        agree = np.einsum("nc,nc->n", facing, axes)
+        agree = np.einsum("nc,nc->n", facing, axes)[: len(points)]
         facing = axes if (agree > 0).mean() > 0.95 else -axes if (agree < 0).mean() > 0.95 else facing
     facing[len(points) :] = down
     mesh = _poisson(whole, facing)
@@ -203,10 +207,31 @@ def _checked(mesh: Mesh, points: np.ndarray, spacing: float, file: str) -> dict[
             f"{file}: expected points whose surface is clear, found a surface that passes 5% of them by at {off * 1e3:.1f} mm; "
             f"their spacing of {spacing * 1e3:.1f} mm is too wide for the walls, or they are too noisy; scan it more closely"
         )
+    gap_m = 2 * float(nearest.max())
     if bare > MOST_BARE:
-        gap = 2e3 * float(nearest.max())
         raise PipelineError(
-            f"{file}: expected points all over the object, found gaps of up to {gap:.0f} mm over {bare:.0%} of its surface; "
-            "scan what is missing, the inside as well"
+            f"{file}: expected points all over the object, found gaps of up to {gap_m * 1e3:.0f} mm over {bare:.0%} of its "
+            "surface; scan what is missing, the inside as well"
         )
-    return {"point_distance_m": off, "share_without_points": bare}
+    return {"point_distance_m": off, "share_without_points": bare, "widest_gap_m": gap_m}
+
+
+def check_bulge(vertices: np.ndarray, points: np.ndarray, spacing: float, file: str) -> None:
+    """Refuse a surface with vertices (V, 3) that balloons beyond the box of the points (N, 3)."""
+    bulge = float(np.abs(vertices - np.clip(vertices, points.min(axis=0), points.max(axis=0))).max())
+    if bulge > MOST_BULGE * spacing:
+        raise PipelineError(
+            f"{file}: expected points whose surface is clear, found a surface that reaches {bulge * 1e3:.0f} mm beyond them; one "
+            f"every {spacing * 1e3:.1f} mm is too few for the walls, or a side is missing; scan it more closely, the inside as well"
+        )
+
+
+def complaints(found: dict[str, Any]) -> list[str]:
+    """Return a sentence when the surface bridges gaps between the points, by what `meshed` found."""
+    bare, gap_mm = found["share_without_points"], 1e3 * found["widest_gap_m"]
+    if gap_mm < 1e3 * WIDE_GAP_M:
+        return []
+    return [
+        f"the points have gaps of up to {gap_mm:.0f} mm, over {bare:.1%} of the surface, which bulges there: where they are in the "
+        "floor or the inner wall, the capacity is a guess; scan what is missing"
+    ]

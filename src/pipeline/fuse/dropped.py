@@ -108,6 +108,7 @@ def _from_points(dropped: DroppedMesh, rng: np.random.Generator) -> tuple[Mesh, 
             f"{file}: expected points of a container, found a surface through them that is not closed or holds no liquid "
             f"(points every {found['spacing_m'] * 1e3:.1f} mm); scan it more closely, the inside as well"
         )
+    clouds.check_bulge(whole[0], points, found["spacing_m"], file)
     facts = {"layout": "cloud", "n_views": 0, "cloud": found, "mended": facts | done}
     return whole, T_object_world, facts | {"table_cut_away": place is not None}
 

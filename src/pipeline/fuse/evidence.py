@@ -65,7 +65,12 @@ def _otherwise_painted(own: np.ndarray, there: np.ndarray, both: np.ndarray) -> 
 
     Where hardly any are seen by both, it is that of any two points: little overlap is no agreement.
     """
-    by_chance = float(np.mean(np.abs(own - np.roll(own, len(own) // 2)) > OTHER_CONTRAST))
+    by_chance = unlike_by_chance(own)
     unlike = np.count_nonzero(np.abs(own - there)[both] > OTHER_CONTRAST)
     few = FEW * len(own)
     return (unlike + few * by_chance) / (np.count_nonzero(both) + few)
+
+
+def unlike_by_chance(contrast: np.ndarray) -> float:
+    """Return the share of pairs of points, whatever two of them (N,), that have unlike contrasts."""
+    return float(np.mean(np.abs(contrast - np.roll(contrast, len(contrast) // 2)) > OTHER_CONTRAST))

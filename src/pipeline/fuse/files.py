@@ -1,6 +1,7 @@
 """Reading the single files of a scan: numbers, JSON, cameras, poses, images. Each error names the file."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,11 @@ INVALID = 65535  # 7-Scenes' mark of a pixel without depth
 INTRINSICS = ("camera-intrinsics.txt", "camera_intrinsics.txt", "camera_intrinsic.json", "intrinsics.txt")
 
 
+def in_order(name: str) -> tuple[list[str | int], str]:
+    """Return what names sort by as their numbers do: 2.png is before 10.png, as Open3D's own tools have it."""
+    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)], name
+
+
 def text(path: Path, what: str, cure: str = "add it") -> str:
     """Return the content of a text file; `cure`: what to do where there is none."""
     if not path.is_file():
@@ -25,7 +31,7 @@ def text(path: Path, what: str, cure: str = "add it") -> str:
             raise PipelineError(
                 f"{path}: expected {what} of less than {MOST_BYTES // 1_000_000} MB, found more; check the file"
             )
-        return path.read_text()
+        return path.read_text(encoding="utf-8-sig")  # Windows marks the beginning
     except (OSError, UnicodeDecodeError) as error:
         raise PipelineError(
             f"{path}: expected {what}, but it is no text: {error}; export it again"

@@ -31,26 +31,34 @@ def read(folder: Path) -> Views | DroppedMesh:
             f"{folder}: expected {_EXPECTED}; found nothing; add the scan or remove the folder"
         )
     options = raw.options(folder / "scan.yaml")
-    layouts = [layout for layout, module in RECORDINGS.items() if module.recognised(folder, names)]
-    dropped = [name for name in names if Path(name).suffix.lower() in MESHES + CLOUDS]
+    layouts, dropped = _recognised(folder, names)
     if len(layouts) == 1 and not dropped:
         raw.refuse(options, folder / "scan.yaml", "depth images", **_OF_OTHERS)
         return _views(folder, layouts[0], names, options)
     if len(dropped) == 1 and not layouts:
         return DroppedMesh(folder / dropped[0], options)
     shown = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+    cure = "keep one scan a folder, in one of these formats"
     if layouts or dropped:
         both = [f"images ({layout})" for layout in layouts] + dropped
         shown = f"{' and '.join(both[:4])}: more than one scan"
-    raise PipelineError(
-        f"{folder}: expected {_EXPECTED}; found {shown}; keep one scan a folder, in one of these formats"
-    )
+    elif inner := [name for name in names if any(_recognised(folder / name, _names(folder / name)))]:
+        cure = f"move what is in {inner[0]}/ one folder up"
+    raise PipelineError(f"{folder}: expected {_EXPECTED}; found {shown}; {cure}")
+
+
+def _recognised(folder: Path, names: list[str]) -> tuple[list[str], list[str]]:
+    """Return the layouts of recordings and the meshes and clouds that are in a folder."""
+    layouts = [layout for layout, module in RECORDINGS.items() if module.recognised(folder, names)]
+    return layouts, [name for name in names if Path(name).suffix.lower() in MESHES + CLOUDS]
 
 
 def _names(folder: Path) -> list[str]:
     try:
         return (
-            sorted(p.name for p in folder.iterdir() if not p.name.startswith(".")) if folder.is_dir() else []
+            sorted((p.name for p in folder.iterdir() if not p.name.startswith(".")), key=files.in_order)
+            if folder.is_dir()
+            else []
         )
     except OSError as error:
         raise PipelineError(

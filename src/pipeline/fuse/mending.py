@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.errors import PipelineError
+from pipeline.fuse import crumbs
 from pipeline.fuse.wrapping import Mesh, wrapped
 from pipeline.geometry import sampling
 from pipeline.geometry.surface import Surface
@@ -39,6 +40,7 @@ def mended(
     """
     mesh = cleaned(mesh, file)
     facts: dict[str, Any] = {"components": int(mesh.body_count), "holes_closed": 0, "remeshed": False}
+    mesh, facts["crumbs_dropped"] = crumbs.without(mesh)
     sheet = seen_from_both_sides(mesh, rng)
     if sheet > MOST_SHEET and wall_m is None:
         raise PipelineError(
@@ -61,6 +63,7 @@ def mended(
         return arrays(mesh), facts
     result = wrapped(*arrays(mesh)).surface()
     _check_kept(mesh, result, file)
+    _check_alone(result, file)
     return result, facts | {"remeshed": True}
 
 
@@ -220,4 +223,17 @@ def _check_kept(mesh: Any, result: Mesh, file: str) -> None:
         raise PipelineError(
             f"{file}: expected a surface that encloses a solid, found {mesh.body_count} parts that do not; "
             "make it one closed mesh where you made it"
+        )
+
+
+def _check_alone(result: Mesh, file: str) -> None:
+    import trimesh
+
+    other = crumbs.beside(trimesh.Trimesh(*result, process=False))
+    if other is not None:
+        x, y, z = (f"{v:.0f}" for v in 1000 * other.mean(axis=0))
+        width = 1000 * np.ptp(other, axis=0).max()
+        raise PipelineError(
+            f"{file}: expected a container alone, found something {width:.0f} mm wide apart from it at "
+            f"({x}, {y}, {z}) mm of the upright object; remove it, or join them, where you made the mesh"
         )

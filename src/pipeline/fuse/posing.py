@@ -51,7 +51,7 @@ def refined(
         return None
     poses = registration.swept(stood, [np.eye(4)] * len(stood), rng)
     known = replace(place, T_object_world=np.eye(4))
-    poses = registration.fitted_to_surface(stood, poses, views, name, rng, known)
+    poses, _ = registration.fitted_to_surface(stood, poses, views, name, rng, known)
     posed = registration.posed(views, stood, poses)
     T_world_object = frames.inverse(place.T_object_world)
     posed = replace(posed, T_world_cameras=[T_world_object @ T for T in posed.T_world_cameras])

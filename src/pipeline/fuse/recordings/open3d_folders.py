@@ -24,9 +24,14 @@ def recognised(folder: Path, names: list[str]) -> bool:
 def frames(folder: Path, names: list[str], options: Options) -> list[Frame]:
     """Return the views in the order of their file names, which is that of trajectory.log."""
     K, where_K = files.intrinsics(folder)
-    depths = sorted(path for path in (folder / "depth").glob("*.png") if not path.name.startswith("."))
+    shown = sorted(
+        (path for path in (folder / "depth").glob("*") if not path.name.startswith(".")),
+        key=lambda path: files.in_order(path.name),
+    )
+    depths = [path for path in shown if path.suffix.lower() == ".png"]
     if not depths:
-        raise PipelineError(f"{folder / 'depth'}: expected depth images *.png, found none; add them")
+        found = f"{shown[0].name}; export them again" if shown else "none; add them"
+        raise PipelineError(f"{folder / 'depth'}: expected depth images *.png of 16 bit, found {found}")
     poses = _poses(folder / LOG, options.unit_m or 1.0) if (folder / LOG).exists() else [None] * len(depths)
     if len(poses) != len(depths):
         raise PipelineError(

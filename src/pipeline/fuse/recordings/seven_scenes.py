@@ -7,7 +7,7 @@ from pipeline.fuse import files
 from pipeline.fuse.raw import Options
 from pipeline.fuse.recordings.frame import Frame, colour
 
-DEPTH = re.compile(r"(?P<stem>.*\d[._-]|.*\d)depth\.png")
+DEPTH = re.compile(r"(?P<stem>.*\d[._-]|.*\d)depth\.(png|PNG)")
 
 
 def recognised(folder: Path, names: list[str]) -> bool:

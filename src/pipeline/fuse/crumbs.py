@@ -1,0 +1,60 @@
+"""Pieces of a mesh that touch nothing else: crumbs of a scan, which go, and other things beside the object, which are found."""
+
+from typing import Any
+
+import numpy as np
+
+from pipeline.geometry.surface import Surface
+
+SMALL = 0.25  # of the widest piece
+APART = (
+    0.01  # of the widest piece: what is nearer to the rest is a part of it, as a handle modelled for itself
+)
+
+
+def without(mesh: Any) -> tuple[Any, int]:
+    """Return the trimesh without its crumbs, small pieces that hang in the air, and how many there were."""
+    pieces, low, high = _pieces(mesh)
+    width = np.linalg.norm(high - low, axis=1)
+    kept = _with_near(mesh, pieces, width >= SMALL * width.max(), APART * width.max())
+    if not kept.all():
+        mesh.update_faces(kept[pieces])
+        mesh.remove_unreferenced_vertices()
+    return mesh, int(np.count_nonzero(~kept))
+
+
+def beside(mesh: Any) -> np.ndarray | None:
+    """Return the corners (2, 3) of a wide thing that stands apart from the widest piece of a trimesh; None without one."""
+    pieces, low, high = _pieces(mesh)
+    width = np.linalg.norm(high - low, axis=1)
+    own = _with_near(mesh, pieces, np.arange(len(width)) == width.argmax(), APART * width.max())
+    other = int(np.where(own, 0.0, width).argmax())
+    return None if own[other] or width[other] < SMALL * width.max() else np.stack([low[other], high[other]])
+
+
+def _pieces(mesh: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the piece (F,) of each triangle, and the corners (P, 3), (P, 3) of the box around each."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    a, b, c = mesh.faces.T
+    ends = np.concatenate([a, b]), np.concatenate([b, c])
+    graph = coo_matrix((np.ones(len(ends[0]), bool), ends), shape=(len(mesh.vertices),) * 2)
+    used, piece = np.unique(connected_components(graph, directed=False)[1][a], return_inverse=True)
+    low, high = np.full((len(used), 3), np.inf), np.full((len(used), 3), -np.inf)
+    np.minimum.at(low, piece, mesh.triangles.min(axis=1))
+    np.maximum.at(high, piece, mesh.triangles.max(axis=1))
+    return piece, low, high
+
+
+def _with_near(mesh: Any, pieces: np.ndarray, kept: np.ndarray, apart_m: float) -> np.ndarray:
+    """Return the pieces (P,) that are kept, with those that are near to them, those near to these, and so on."""
+    new = kept
+    while new.any() and not kept.all():
+        surface = Surface(np.asarray(mesh.vertices, float), np.asarray(mesh.faces)[new[pieces]])
+        asked = np.flatnonzero(~kept[pieces])
+        distance = surface.distance(mesh.triangles[asked].reshape(-1, 3)).reshape(-1, 3).min(axis=1)
+        new = np.zeros(len(kept), bool)
+        new[pieces[asked[distance < apart_m]]] = True
+        kept = kept | new
+    return kept
