@@ -27,7 +27,9 @@ def completed(
     levels = np.flatnonzero(walled_in.any(axis=(0, 1)))
     for z in levels[::-1]:  # down to the floor, whose level tells what is in shadow below
         level, seen, room = value[..., z], measured[..., z], walled_in[..., z]
-        level = _opened(level, seen, _beyond_wall_inside(level, seen, room, voxel_m), room, truncation_m / voxel_m)
+        level = _opened(
+            level, seen, _beyond_wall_inside(level, seen, room, voxel_m), room, truncation_m / voxel_m
+        )
         room = _connected(level > 0, room)
         beyond = _beyond_wall_outside(level, seen, room, voxel_m)
         outside = (level > 0) & ~room
@@ -47,7 +49,9 @@ def _opened(
     return np.where(unseen & reached, np.maximum(value, np.clip(beyond / truncation, -1.0, 1.0)), value)
 
 
-def _beyond_wall_inside(value: np.ndarray, measured: np.ndarray, room: np.ndarray, voxel_m: float) -> np.ndarray:
+def _beyond_wall_inside(
+    value: np.ndarray, measured: np.ndarray, room: np.ndarray, voxel_m: float
+) -> np.ndarray:
     """Return how much deeper in the body than its wall is thick the voxels (nx, ny) of a level are, in voxels."""
     solid = value <= 0
     body = _without_handles(ndimage.binary_fill_holes(solid | room), voxel_m) | room
@@ -56,7 +60,9 @@ def _beyond_wall_inside(value: np.ndarray, measured: np.ndarray, room: np.ndarra
     return _beyond(depth, edge & _seen_at(solid & measured, outside))
 
 
-def _beyond_wall_outside(value: np.ndarray, measured: np.ndarray, room: np.ndarray, voxel_m: float) -> np.ndarray:
+def _beyond_wall_outside(
+    value: np.ndarray, measured: np.ndarray, room: np.ndarray, voxel_m: float
+) -> np.ndarray:
     """Return how much further from the cavity than its wall is thick the voxels (nx, ny) are, in voxels; handles stay."""
     solid = value <= 0
     distance, inside = ndimage.distance_transform_edt(~room, return_indices=True)
