@@ -22,7 +22,8 @@ DEPTH = 8  # of Poisson's octree
 # A sound surface passes by the points within this many spacings, and has points everywhere within so many.
 MOST_OFF, MOST_BARE, BARE = 1.0, 0.05, 4.0
 WIDE_GAP_M = 0.015  # is said: the surface bulges by a quarter of it; clouds without gaps have up to 0.012
-MOST_BULGE = 2.5  # spacings beyond the box of the points: sparse points of a lip let the surface balloon
+# Beyond the box of the points, in spacings, and at least so much: sparse points of a lip let the surface balloon.
+MOST_BULGE, SLIGHT_BULGE_M = 2.5, 0.004
 
 
 def read(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
@@ -219,7 +220,7 @@ def _checked(mesh: Mesh, points: np.ndarray, spacing: float, file: str) -> dict[
 def check_bulge(vertices: np.ndarray, points: np.ndarray, spacing: float, file: str) -> None:
     """Refuse a surface with vertices (V, 3) that balloons beyond the box of the points (N, 3)."""
     bulge = float(np.abs(vertices - np.clip(vertices, points.min(axis=0), points.max(axis=0))).max())
-    if bulge > MOST_BULGE * spacing:
+    if bulge > max(MOST_BULGE * spacing, SLIGHT_BULGE_M):
         raise PipelineError(
             f"{file}: expected points whose surface is clear, found a surface that reaches {bulge * 1e3:.0f} mm beyond them; one "
             f"every {spacing * 1e3:.1f} mm is too few for the walls, or a side is missing; scan it more closely, the inside as well"
