@@ -162,6 +162,12 @@ def test_mesh_of_unit_size_and_the_cure(tmp_path):
     np.testing.assert_allclose(np.ptp(fused(folder, **OPTIONS).mesh[0], axis=0), 0.01, rtol=1e-6)
 
 
+def test_wrong_units_are_not_told_to_be_written_once_more(tmp_path):
+    box(tmp_path / "cm" / "cup.stl", 250.0)
+    (tmp_path / "cm" / "scan.yaml").write_text("units: cm\n")
+    assert "write `units" not in refused(tmp_path / "cm", "2.5 m", "correct `units`")
+
+
 def test_a_frame_without_its_pose(folder):
     (folder / "frame-000004.pose.txt").unlink()
     refused(folder, "frame-000004.pose.txt", "add it or remove the frame")

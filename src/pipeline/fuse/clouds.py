@@ -11,7 +11,7 @@ from pipeline.errors import PipelineError
 from pipeline.fuse.wrapping import Mesh
 
 LEAST_POINTS, MOST_POINTS = 2000, 20_000_000
-MARK = 100  # points that are all the same mark pixels without depth, by zeros mostly
+MARK = 100  # times as often as others: these points mark pixels without depth, by zeros mostly
 FINEST = 110  # points along the longest side: more are averaged
 NEIGHBOURS = 16
 REACHES = (1.5, 2.0, 2.5, 3.0)  # spacings: what is further from every point can be passed
@@ -21,7 +21,7 @@ BASE_SHARE = 0.5  # of the footprint must be covered by points of the underside,
 DEPTH = 8  # of Poisson's octree
 # A sound surface passes by the points within this many spacings, and has points everywhere within so many.
 MOST_OFF, MOST_BARE, BARE = 1.0, 0.05, 4.0
-WIDE_GAP_M = 0.015  # is said: the surface bulges by a quarter of it; clouds without gaps have up to 0.012
+WIDE_GAP_M = 0.015  # is said, if wide for the spacing, too: the surface bulges by a quarter; clouds without gaps have up to 0.012
 # Beyond the box of the points, in spacings, and at least so much: sparse points of a lip let the surface balloon.
 MOST_BULGE, SLIGHT_BULGE_M = 2.5, 0.004
 
@@ -34,11 +34,12 @@ def read(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
         finite &= np.isfinite(normals).all(axis=1) & (np.linalg.norm(normals, axis=1) > 1e-9)
         normals = normals[finite] / np.linalg.norm(normals[finite], axis=1, keepdims=True)
     points, index, times = np.unique(points[finite], axis=0, return_index=True, return_counts=True)
+    own = times < MARK * np.median(times) if len(times) else times > 0
+    points, index = points[own], index[own]
     if not LEAST_POINTS <= len(points) <= MOST_POINTS:
         raise PipelineError(
             f"{path}: expected {LEAST_POINTS} to {MOST_POINTS} different points, found {len(points)}; export the cloud again"
         )
-    points, index = points[times < MARK], index[times < MARK]
     return points, None if normals is None else normals[index]
 
 
@@ -230,7 +231,7 @@ def check_bulge(vertices: np.ndarray, points: np.ndarray, spacing: float, file: 
 def complaints(found: dict[str, Any]) -> list[str]:
     """Return a sentence when the surface bridges gaps between the points, by what `meshed` found."""
     bare, gap_mm = found["share_without_points"], 1e3 * found["widest_gap_m"]
-    if gap_mm < 1e3 * WIDE_GAP_M:
+    if gap_mm < 1e3 * max(WIDE_GAP_M, 2 * BARE * found["spacing_m"]):
         return []
     return [
         f"the points have gaps of up to {gap_mm:.0f} mm, over {bare:.1%} of the surface, which bulges there: where they are in the "

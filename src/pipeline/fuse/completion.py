@@ -36,7 +36,9 @@ def completed(
         value[..., z] = _opened(level, seen, beyond, outside, truncation_m / voxel_m)
     for z in range(levels[0]):
         level, seen = value[..., z], measured[..., z]
-        value[..., z] = _opened(level, seen, beyond, level > 0, truncation_m / voxel_m)
+        foot = (level <= 0) & seen & (beyond > OFF_M / voxel_m)
+        if np.count_nonzero(foot) < LEAST_EDGE:  # what is wider than the wall above was not in its shadow
+            value[..., z] = _opened(level, seen, beyond, level > 0, truncation_m / voxel_m)
     return value
 
 

@@ -7,9 +7,9 @@ import numpy as np
 from pipeline.geometry.surface import Surface
 
 SMALL = 0.25  # of the widest piece
-APART = (
-    0.01  # of the widest piece: what is nearer to the rest is a part of it, as a handle modelled for itself
-)
+# Of the widest piece: what is nearer to the rest is a part of it, as a handle modelled for itself.
+APART = 0.01
+MOST_HALVED = 20
 
 
 def without(mesh: Any) -> tuple[Any, int]:
@@ -49,12 +49,18 @@ def _pieces(mesh: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _with_near(mesh: Any, pieces: np.ndarray, kept: np.ndarray, apart_m: float) -> np.ndarray:
     """Return the pieces (P,) that are kept, with those that are near to them, those near to these, and so on."""
+    from trimesh.remesh import subdivide_to_size
+
     new = kept
     while new.any() and not kept.all():
         surface = Surface(np.asarray(mesh.vertices, float), np.asarray(mesh.faces)[new[pieces]])
         asked = np.flatnonzero(~kept[pieces])
-        distance = surface.distance(mesh.triangles[asked].reshape(-1, 3)).reshape(-1, 3).min(axis=1)
+        # Points all over: a piece that sticks in the rest may have no corner near its surface.
+        points, faces, of = subdivide_to_size(
+            mesh.vertices, mesh.faces[asked], apart_m, MOST_HALVED, return_index=True
+        )
+        near = (surface.distance(points) < apart_m)[faces].any(axis=1)
         new = np.zeros(len(kept), bool)
-        new[pieces[asked[distance < apart_m]]] = True
+        new[pieces[asked[of[near]]]] = True
         kept = kept | new
     return kept

@@ -16,7 +16,7 @@ from pipeline.geometry.sampling import uniform_points
 
 LARGEST_M, SMALLEST_M = 2.0, 0.005
 LARGEST_UNTOLD_M = 0.6  # without `units`: a mesh of unit size is as likely one that was normalised
-LEAST_IN_MM = 30.0  # what is larger is no number of centimetres or inches
+LEAST_IN_MM, MOST_IN_CM = 30.0, 60.0  # between them both may be meant
 CLOUDS = (".pcd", ".npz")
 TABLE_SAMPLES = 100_000
 _OF_IMAGES = {"depth_scale": "it has no depth images", "turntable_deg": "it has no views"}
@@ -45,7 +45,7 @@ def _from_mesh(
     file, options = str(dropped.path), dropped.options
     mesh.vertices = np.asarray(mesh.vertices, float) * (options.unit_m or 1.0)
     mesh = mending.cleaned(mesh, file)
-    _check_size(mesh.vertices, dropped)
+    _check_size(mesh.vertices, dropped, LARGEST_M)
     up = options.up or "z"
     T_object_world = upright(mesh.vertices, up)
     place = _on_table(mesh, dropped, rng)
@@ -54,6 +54,7 @@ def _from_mesh(
         mesh, T_object_world, up = standing.cut(mesh, place), place.T_object_world, "z"
     mesh.vertices = frames.apply(T_object_world, mesh.vertices)
     mesh = mending.cleaned(mesh, file)
+    _check_size(mesh.vertices, dropped, LARGEST_UNTOLD_M)
     whole, facts = mending.mended(mesh, options.wall_m, file, rng)
     whole, done = _holding(whole, up, file)
     return whole, T_object_world, {"layout": "mesh", "n_views": 0, "mended": facts | done}
@@ -83,7 +84,7 @@ def _from_points(dropped: DroppedMesh, rng: np.random.Generator) -> tuple[Mesh, 
     raw.refuse(options, dropped.path.parent / "scan.yaml", "a point cloud", wall_mm=reason)
     points, normals = clouds.read(dropped.path)
     points = points * (options.unit_m or 1.0)
-    _check_size(points, dropped)
+    _check_size(points, dropped, LARGEST_M)
     up, place = options.up or "z", standing.found(points, options.on_table, file, rng)
     T_object_world = upright(points, up)
     if place is not None:
@@ -91,6 +92,7 @@ def _from_points(dropped: DroppedMesh, rng: np.random.Generator) -> tuple[Mesh, 
         own = standing.belongs(points, place)
         points, normals = points[own], None if normals is None else normals[own]
         T_object_world, up = place.T_object_world, "z"
+    _check_size(points, dropped, LARGEST_UNTOLD_M)
     points = frames.apply(T_object_world, points)
     normals = None if normals is None else frames.rotate(T_object_world, normals)
     surface, found = clouds.meshed(points, normals, file)
@@ -170,13 +172,16 @@ def holds(mesh: Mesh) -> bool:
     return True
 
 
-def _check_size(vertices_m: np.ndarray, dropped: DroppedMesh) -> None:
-    size = float(np.ptp(vertices_m, axis=0).max())
+def _check_size(vertices_m: np.ndarray, dropped: DroppedMesh, largest_m: float) -> None:
+    """Refuse what is too small, and too large: more than `largest_m` where scan.yaml gives no units."""
+    size = float(np.ptp(vertices_m, axis=0).max()) if len(vertices_m) else 0.0
     path, file = dropped.path, dropped.path.parent / "scan.yaml"
-    largest = LARGEST_M if dropped.options.unit_m else LARGEST_UNTOLD_M
-    if size > largest:
+    is_told = dropped.options.unit_m is not None
+    largest_m = LARGEST_M if is_told else largest_m
+    if size > largest_m:
+        cure = f"correct `units` in {file} (m, cm or mm)" if is_told else f"{_cure(size)} into {file}"
         raise PipelineError(
-            f"{path}: expected a container of at most {largest:g} m, found one of {size:.3g} m; {_cure(size)} into {file}"
+            f"{path}: expected a container of at most {largest_m:g} m, found one of {size:.3g} m; {cure}"
         )
     if size < SMALLEST_M:
         raise PipelineError(
@@ -187,8 +192,12 @@ def _check_size(vertices_m: np.ndarray, dropped: DroppedMesh) -> None:
 
 def _cure(size: float) -> str:
     """Return what to do with a mesh of `size` where metres were expected."""
-    if size > LEAST_IN_MM:
+    if size > MOST_IN_CM:
         return "looks like millimetres: write `units: mm`"
+    if size > LEAST_IN_MM:
+        return (
+            "looks like millimetres or, if it is a large one, centimetres: write `units: mm` or `units: cm`"
+        )
     if size > LARGEST_M:
         return "looks like centimetres or inches: write `units: cm` (inches: times 2.54 before)"
     return "scale it to its true size, or, if it is that large, write `units: m`"

@@ -19,7 +19,7 @@ INTRINSICS = ("camera-intrinsics.txt", "camera_intrinsics.txt", "camera_intrinsi
 
 def in_order(name: str) -> tuple[list[str | int], str]:
     """Return what names sort by as their numbers do: 2.png is before 10.png, as Open3D's own tools have it."""
-    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)], name
+    return [int(part) if part.isdecimal() else part for part in re.split(r"(\d+)", name)], name
 
 
 def text(path: Path, what: str, cure: str = "add it") -> str:

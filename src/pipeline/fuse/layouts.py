@@ -42,7 +42,7 @@ def read(folder: Path) -> Views | DroppedMesh:
     if layouts or dropped:
         both = [f"images ({layout})" for layout in layouts] + dropped
         shown = f"{' and '.join(both[:4])}: more than one scan"
-    elif inner := [name for name in names if any(_recognised(folder / name, _names(folder / name)))]:
+    elif inner := [name for name in names if _holds_a_scan(folder / name)]:
         cure = f"move what is in {inner[0]}/ one folder up"
     raise PipelineError(f"{folder}: expected {_EXPECTED}; found {shown}; {cure}")
 
@@ -51,6 +51,13 @@ def _recognised(folder: Path, names: list[str]) -> tuple[list[str], list[str]]:
     """Return the layouts of recordings and the meshes and clouds that are in a folder."""
     layouts = [layout for layout, module in RECORDINGS.items() if module.recognised(folder, names)]
     return layouts, [name for name in names if Path(name).suffix.lower() in MESHES + CLOUDS]
+
+
+def _holds_a_scan(folder: Path) -> bool:
+    try:
+        return any(_recognised(folder, _names(folder)))
+    except PipelineError:  # not what is wrong here
+        return False
 
 
 def _names(folder: Path) -> list[str]:

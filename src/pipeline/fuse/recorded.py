@@ -1,6 +1,7 @@
 """Depth images on their way to fusion: poses checked, or found where there are none; table and object found."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,7 @@ class Located:
     poses_off_m: float | None = None
     is_refined: bool = False
 
-    @property
+    @cached_property
     def spread_m(self) -> float:
         """The noise of depth, from the table."""
         return placement.spread_m(posing.ground(self.views, self.placement, posing.MEDIUM)[0][:, 2])

@@ -4,6 +4,7 @@ Turns are searched all round, so that neither an order of the views nor an overl
 what a view measures (places, normals, colours: nearest neighbours in all three) and what it looks through.
 """
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -90,16 +91,16 @@ def _fitted(
         return fitted_to_surface(stood, poses, views, name, rng)[0], True
     known = views.options.turntable_deg is not None
     if not known:
-        turned, surface = fitted_to_surface(stood, _all_round(stood, poses), views, name, rng)
-        if (beyond := _beyond(stood, turned, surface)) < MOST_BEYOND:
-            return turned, False
+        with suppress(PipelineError):  # a handle that is turned all round may be a second object, or nothing
+            turned, surface = fitted_to_surface(stood, _all_round(stood, poses), views, name, rng)
+            if _beyond(stood, turned, surface) < MOST_BEYOND:
+                return turned, False
     found, surface = fitted_to_surface(stood, poses, views, name, rng)
-    if (off := _beyond(stood, found, surface)) < MOST_BEYOND:
+    if (beyond := _beyond(stood, found, surface)) < MOST_BEYOND:
         return found, not known
     cure = "correct `turntable_deg:` in scan.yaml" if known else "write `turntable_deg:` into scan.yaml"
-    off = off if known else beyond
     raise PipelineError(
-        f"{name}: expected a round object where turns of the views cannot be told, found {off:.1%} of what they show more than "
+        f"{name}: expected a round object where turns of the views cannot be told, found {beyond:.1%} of what they show more than "
         f"{BEYOND_M * 1e3:g} mm off one, as a small handle is, or views that do not fit; add poses, {cure}, or go nearer"
     )
 
@@ -142,7 +143,8 @@ def check_alike(stood: list[Levelled], names: list[str], name: str) -> None:
     """Refuse views that show things of such different widths that some must show the object with its turntable."""
     widths_m = np.array([np.ptp(view.points_m[:, :2], axis=0).max() for view in stood])
     order = np.argsort(widths_m)
-    narrow, wide = order[len(order) // 10], order[-1 - len(order) // 10]
+    odd = max(1, len(order) // 10)
+    narrow, wide = order[odd], order[-1 - odd]
     least, most = (f"{1e3 * widths_m[k]:.0f} mm in {names[stood[k].number]}" for k in (narrow, wide))
     if widths_m[wide] > MOST_WIDER * widths_m[narrow]:
         raise PipelineError(

@@ -23,4 +23,5 @@ class Frame:
 
 def colour(folder: Path, stem: str) -> Path | None:
     """Return the colour image `stem`, whatever its format, if there is one."""
-    return next((folder / f"{stem}{end}" for end in COLOURS if (folder / f"{stem}{end}").is_file()), None)
+    ends = [end for lower in COLOURS for end in (lower, lower.upper())]
+    return next((folder / f"{stem}{end}" for end in ends if (folder / f"{stem}{end}").is_file()), None)
