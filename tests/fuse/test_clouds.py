@@ -164,3 +164,12 @@ def test_a_gap_in_the_floor_is_said(tmp_path):
         told.append(fused(tmp_path / name, **OPTIONS).complaints)
     assert told[0] == ()
     assert "the capacity is a guess" in told[1][0]
+
+
+def test_another_thing_in_the_cloud_is_refused(tmp_path):
+    places, normals = points()
+    ball = trimesh.creation.icosphere(4, 0.02)
+    other = np.concatenate([places, ball.vertices + [0.15, 0.0, 0.02]])
+    write(tmp_path / "cup" / "cup.ply", other, np.concatenate([normals, ball.vertex_normals]))
+    with pytest.raises(PipelineError, match="apart from it"):
+        fused(tmp_path / "cup", **OPTIONS)

@@ -139,3 +139,12 @@ def test_a_small_piece_that_sticks_in_the_wall_stays(tmp_path):
 def test_another_thing_in_the_mesh_is_refused(tmp_path):
     with pytest.raises(PipelineError, match=r"found something \d+ mm wide apart from it at \(.*remove it"):
         with_pieces(tmp_path, ball(0.02, 0.1, 0, 0.02))
+
+
+def test_another_thing_beside_a_sheet_is_refused(tmp_path):
+    cup = trimesh.creation.revolve([[0.0, 0.0], [0.03, 0.0], [0.03, 0.06]], sections=48)
+    both = trimesh.util.concatenate([cup, ball(0.015, 0.09, 0, 0.03)])
+    (tmp_path / "cup").mkdir()
+    (tmp_path / "cup" / "scan.yaml").write_text("wall_mm: 3\n")
+    with pytest.raises(PipelineError, match="apart from it"):
+        drop(tmp_path / "cup", both.vertices, both.faces)

@@ -21,6 +21,7 @@ BASE_SHARE = 0.5  # of the footprint must be covered by points of the underside,
 DEPTH = 8  # of Poisson's octree
 # A sound surface passes by the points within this many spacings, and has points everywhere within so many.
 MOST_OFF, MOST_BARE, BARE = 1.0, 0.05, 4.0
+APART_M, OTHER = 0.01, 0.05  # from the rest, and of the points: another thing, which a surface would be joined to
 WIDE_GAP_M = 0.015  # is said, if wide for the spacing, too: the surface bulges by a quarter; clouds without gaps have up to 0.012
 # Beyond the box of the points, in spacings, and at least so much: sparse points of a lip let the surface balloon.
 MOST_BULGE, SLIGHT_BULGE_M = 2.5, 0.004
@@ -103,6 +104,7 @@ def meshed(points: np.ndarray, normals: np.ndarray | None, file: str) -> tuple[M
     """
     points, normals = _thinned(points, normals)
     spacing = float(np.median(cKDTree(points).query(points, k=7)[0][:, 6])) / 1.5
+    _check_alone(points, spacing, file)
     base = _base(points, spacing)
     given = normals is not None
     normals = normals if given else _axes(points)
@@ -216,6 +218,22 @@ def _checked(mesh: Mesh, points: np.ndarray, spacing: float, file: str) -> dict[
             "surface; scan what is missing, the inside as well"
         )
     return {"point_distance_m": off, "share_without_points": bare, "widest_gap_m": gap_m}
+
+
+def _check_alone(points: np.ndarray, spacing: float, file: str) -> None:
+    cells = np.floor((points - points.min(axis=0)) / max(APART_M, BARE * spacing)).astype(int)
+    held = np.zeros(cells.max(axis=0) + 1, bool)
+    held[tuple(cells.T)] = True
+    label = ndimage.label(held, np.ones((3, 3, 3)))[0][tuple(cells.T)]
+    count = np.bincount(label)
+    other = points[label == np.argsort(count)[-2]]
+    if len(other) > OTHER * len(points):
+        x, y, z = (f"{v:.0f}" for v in 1e3 * (other.min(axis=0) + other.max(axis=0)) / 2)
+        width_mm = 1e3 * np.ptp(other, axis=0).max()
+        raise PipelineError(
+            f"{file}: expected points of one container, found something {width_mm:.0f} mm wide apart from it at ({x}, {y}, {z}) mm "
+            "of the upright object; remove its points"
+        )
 
 
 def check_bulge(vertices: np.ndarray, points: np.ndarray, spacing: float, file: str) -> None:

@@ -101,6 +101,8 @@ def _from_points(dropped: DroppedMesh, rng: np.random.Generator) -> tuple[Mesh, 
         whole, facts = mending.mended(mesh, None, file, rng)
         whole, done = _holding(whole, up, file)
         sound = holds(whole)
+    except mending.SomethingBeside:
+        raise
     except PipelineError as error:
         if "`up:" in str(error):
             raise

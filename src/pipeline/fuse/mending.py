@@ -31,6 +31,10 @@ class Hole:
     high_m: float
 
 
+class SomethingBeside(PipelineError):
+    """There is another thing beside the object."""
+
+
 def mended(
     mesh: Any, wall_m: float | None, file: str, rng: np.random.Generator
 ) -> tuple[Mesh, dict[str, Any]]:
@@ -53,7 +57,9 @@ def mended(
             f"({sheet:.0%} of it can be seen from both sides); remove `wall_mm`"
         )
     if sheet > MOST_SHEET:
-        return wrapped(*arrays(mesh), wall_m).surface(), facts | {"remeshed": True, "thickened_m": wall_m}
+        result = wrapped(*arrays(mesh), wall_m).surface()
+        _check_alone(result, file)
+        return result, facts | {"remeshed": True, "thickened_m": wall_m}
     found = holes(mesh)
     _check(found, mesh, file)
     if found:
@@ -233,7 +239,7 @@ def _check_alone(result: Mesh, file: str) -> None:
     if other is not None:
         x, y, z = (f"{v:.0f}" for v in 1000 * other.mean(axis=0))
         width = 1000 * np.ptp(other, axis=0).max()
-        raise PipelineError(
+        raise SomethingBeside(
             f"{file}: expected a container alone, found something {width:.0f} mm wide apart from it at "
-            f"({x}, {y}, {z}) mm of the upright object; remove it, or join them, where you made the mesh"
+            f"({x}, {y}, {z}) mm of the upright object; remove it, or join them, where you made the file"
         )

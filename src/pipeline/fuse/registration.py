@@ -48,9 +48,8 @@ MOST_LEFT_OUT = 0.2
 # it lacks a handle of 14 mm.
 BEYOND_M, MOST_BEYOND = 0.005, 0.01
 MOST_WIDER = 3.0  # a pan is twice as wide where its handle is seen
-LEAST_PAINT = (
-    0.15  # of pairs of points are unlike: where fewer are, it is shade, gloss and the camera's noise
-)
+# Of pairs of points are unlike: where fewer are, it is shade, gloss and the camera's noise.
+LEAST_PAINT = 0.15
 
 
 def registered(views: Views, name: str, rng: np.random.Generator) -> tuple[Views, dict[str, Any]]:
@@ -72,6 +71,7 @@ def registered(views: Views, name: str, rng: np.random.Generator) -> tuple[Views
         poses = swept(stood, poses, rng)
     poses, is_told = _fitted(stood, poses, told, views, name, rng)
     facts = {"views_without_object": left_out, "roll_observable": is_told, "roll_evidence": told}
+    facts["turns_given"] = views.options.turntable_deg is not None
     return posed(views, stood, poses), facts
 
 

@@ -83,7 +83,9 @@ def summary(seen: "np.ndarray", facts: dict[str, Any]) -> str:
     if facts["n_views"]:
         said.append(f"{facts['n_views']} views, poses {facts.get('poses', 'given')}")
         said.append(f"{seen.mean():.0%} of the surface seen (orange: closed, not seen)")
-    if facts.get("roll_observable") is False:
+    if facts.get("turns_given"):
+        said.append("turns of the table as given")
+    elif facts.get("roll_observable") is False:
         said.append("turn about the vertical not observable: round")
     if facts.get("views_left_out"):
         said.append(f"{len(facts['views_left_out'])} views left out")
