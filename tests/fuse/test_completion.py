@@ -21,9 +21,7 @@ def fused(views) -> tsdf.Surface:
     return tsdf.fuse(views, place, VOXEL_M, TRUNCATION_M, "scan")
 
 
-@pytest.mark.parametrize(
-    ("name", "towards_deg", "arc_deg"), [("mug", 0, 120), ("mug", 180, 120), ("tall_cup", 90, 120)]
-)
+@pytest.mark.parametrize(("name", "towards_deg", "arc_deg"), [("mug", 0, 120), ("tall_cup", 90, 120)])
 def test_what_is_not_seen_of_a_wall_is_no_thicker_than_the_rest(name, towards_deg, arc_deg):
     surface = fused(scenes.of_one_side(name, towards_deg, arc_deg))
     room = cavity(surface.vertices_m, surface.triangles, name=name)
