@@ -1,7 +1,7 @@
 """What scans from one side are like: `python benchmarks/arcs.py`; the table is in docs/fusion.md.
 
 Each demonstration object in the views of 48 that are within an arc around its handle's side, and around the other side: the error
-of its capacity as fused, and, in brackets, with unseen parts of the inner wall left solid.
+of its capacity as fused, and, in brackets, with what was not seen left solid.
 """
 
 import argparse

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.spatial.transform import Rotation
 
 from pipeline.artefacts import points, read_json, read_table
 from pipeline.errors import PipelineError
@@ -27,12 +26,8 @@ from pipeline.scan.shapes import NAMES, shape
 
 VIEWS, DISTANCE_M, NOISE, SEED = 36, 0.6, 1.0, 1
 HOW = {"voxel_m": 0.00125, "truncation_m": 0.0025, "n_points": 12000, "seed": 2}  # config/config.yaml
-OFF = (
-    (0.2, 0.03),
-    (0.5, 0.1),
-    (1.5, 0.3),
-    (3.0, 0.5),
-)  # millimetres and degrees, standard deviations of each axis
+# Millimetres and degrees, standard deviations of each axis.
+OFF = ((0.2, 0.03), (0.5, 0.1), (1.5, 0.3), (3.0, 0.5))
 DRIFT_M = 0.005
 STARTS_DEG, FEW, MANY = 5, 400, 1500
 
@@ -45,16 +40,6 @@ def record(folder: Path, name: str) -> Path:
     recording.write(raw, recording.views(body, T_world_object, VIEWS, DISTANCE_M, NOISE, SEED))
     truth.write(folder / "scan" / name, body, T_world_object, rng)
     return raw
-
-
-def shaken(views: Views, shift_m: float, turn_deg: float) -> Views:
-    """Return the views with poses that are off at random."""
-    rng = np.random.default_rng(SEED)
-    poses = []
-    for T in views.T_world_cameras:
-        turn = Rotation.from_rotvec(np.radians(rng.normal(0.0, turn_deg, 3))).as_matrix()
-        poses.append(frames.transform(turn @ T[:3, :3], T[:3, 3] + rng.normal(0.0, shift_m, 3)))
-    return replace(views, T_world_cameras=poses)
 
 
 def drifting(views: Views) -> Views:
@@ -167,9 +152,12 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--objects", nargs="*", default=list(NAMES), help="for scans without poses")
     names = options.parse_args().objects
+    sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+    from fuse import scenes
+
     with tempfile.TemporaryDirectory() as scratch:
         views = layouts.read(record(Path(scratch), "mug"))
-        cases = [(f"{mm:g} mm, {deg:g}°", shaken(views, mm / 1e3, deg)) for mm, deg in OFF]
+        cases = [(f"{mm:g} mm, {deg:g}°", scenes.shaken(views, mm / 1e3, deg, SEED)) for mm, deg in OFF]
         cases.append((f"drift of {1e3 * DRIFT_M:g} mm over the views", drifting(views)))
         sys.stdout.write("| poses off, an axis | as given | refined |\n|---|---|---|\n")
         for said, case in cases:

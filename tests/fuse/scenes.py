@@ -1,9 +1,10 @@
-"""Cups of any wall on a table, scanned in memory: for tests of thin walls, and for `benchmarks/fusion.py` and `arcs.py`."""
+"""Cups of any wall on a table, scanned in memory: for tests, and for `benchmarks/fusion.py`, `arcs.py` and `poses.py`."""
 
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from pipeline.fuse.raw import Options, Views
 from pipeline.geometry import frames
@@ -46,3 +47,13 @@ def of_one_side(name: str, towards_deg: float, arc_deg: float, n: int = 48) -> V
         names=[all_round.names[i] for i in kept],
         n_found=len(kept),
     )
+
+
+def shaken(given: Views, shift_m: float, turn_deg: float, seed: int = 3) -> Views:
+    """Return the views with poses that are off at random: standard deviations of each coordinate of shift and turn."""
+    rng = np.random.default_rng(seed)
+    poses = []
+    for T in given.T_world_cameras:
+        turn = Rotation.from_rotvec(np.radians(rng.normal(0.0, turn_deg, 3))).as_matrix()
+        poses.append(frames.transform(turn @ T[:3, :3], T[:3, 3] + rng.normal(0.0, shift_m, 3)))
+    return replace(given, T_world_cameras=poses)

@@ -1,24 +1,13 @@
 """Given poses that are a little off: said by how much, and refined on the table and the object."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from fuse import scenes
 from scipy.spatial.transform import Rotation
 
 from pipeline.fuse import layouts, posing, recorded, tsdf
 from pipeline.geometry import frames
 from pipeline.geometry.cavity import cavity
-
-
-def shaken(views, shift_m: float, turn_deg: float):
-    """Return the views with poses that are off at random: standard deviations of each coordinate of shift and turn."""
-    rng = np.random.default_rng(3)
-    poses = []
-    for T in views.T_world_cameras:
-        turn = Rotation.from_rotvec(np.radians(rng.normal(0.0, turn_deg, 3))).as_matrix()
-        poses.append(frames.transform(turn @ T[:3, :3], T[:3, 3] + rng.normal(0.0, shift_m, 3)))
-    return replace(views, T_world_cameras=poses)
 
 
 def located(views):
@@ -38,7 +27,7 @@ def test_right_poses_stay_as_given(scan):
 def test_poses_of_a_shaky_arm_are_refined(scan, name):
     """1.5 mm and 0.3° an axis at 0.6 m, of which nothing is left of an inside without: what it holds is within 2 %."""
     case = scan(name)
-    found = located(shaken(layouts.read(case.folder), 0.0015, 0.3))
+    found = located(scenes.shaken(layouts.read(case.folder), 0.0015, 0.3))
     assert found.facts()["poses"] == "refined"
     assert found.poses_off_m == pytest.approx(0.0027, abs=0.0007)
     assert "refined on table and object" in recorded.complaints(found.facts())[0]

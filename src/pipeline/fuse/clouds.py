@@ -21,10 +21,8 @@ BASE_SHARE = 0.5  # of the footprint must be covered by points of the underside,
 DEPTH = 8  # of Poisson's octree
 # A sound surface passes by the points within this many spacings, and has points everywhere within so many.
 MOST_OFF, MOST_BARE, BARE = 1.0, 0.05, 4.0
-APART_M, OTHER = (
-    0.01,
-    0.05,
-)  # from the rest, and of the points: another thing, which a surface would be joined to
+# From the rest, and of the points: another thing, which the surface would be joined to.
+APART_M, OTHER = 0.01, 0.05
 WIDE_GAP_M = 0.015  # is said, if wide for the spacing, too: the surface bulges by a quarter; clouds without gaps have up to 0.012
 # Beyond the box of the points, in spacings, and at least so much: sparse points of a lip let the surface balloon.
 MOST_BULGE, SLIGHT_BULGE_M = 2.5, 0.004

@@ -23,22 +23,20 @@ def completed(
     edge = ndimage.binary_dilation(walled_in, _CROSS[..., None]) & (value <= 0)
     if np.count_nonzero(edge & ~measured) <= LEAST_UNSEEN * np.count_nonzero(edge):
         return value
-    value = value.copy()
+    value, truncation = value.copy(), truncation_m / voxel_m
     levels = np.flatnonzero(walled_in.any(axis=(0, 1)))
     for z in levels[::-1]:  # down to the floor, whose level tells what is in shadow below
         level, seen, room = value[..., z], measured[..., z], walled_in[..., z]
-        level = _opened(
-            level, seen, _beyond_wall_inside(level, seen, room, voxel_m), room, truncation_m / voxel_m
-        )
-        room = _connected(level > 0, room)
+        beyond = _beyond_wall_inside(level, seen, room, voxel_m)
+        level = _opened(level, seen, beyond, room, truncation)
+        room = ndimage.binary_propagation(room, mask=level > 0)
         beyond = _beyond_wall_outside(level, seen, room, voxel_m)
-        outside = (level > 0) & ~room
-        value[..., z] = _opened(level, seen, beyond, outside, truncation_m / voxel_m)
+        value[..., z] = _opened(level, seen, beyond, (level > 0) & ~room, truncation)
     for z in range(levels[0]):
         level, seen = value[..., z], measured[..., z]
         foot = (level <= 0) & seen & (beyond > OFF_M / voxel_m)
         if np.count_nonzero(foot) < LEAST_EDGE:  # what is wider than the wall above was not in its shadow
-            value[..., z] = _opened(level, seen, beyond, level > 0, truncation_m / voxel_m)
+            value[..., z] = _opened(level, seen, beyond, level > 0, truncation)
     return value
 
 
@@ -47,8 +45,9 @@ def _opened(
 ) -> np.ndarray:
     """Return the values (nx, ny) of a level, open where nothing was seen beyond the wall (in voxels), on ways from the start."""
     unseen = (value <= 0) & ~measured
-    reached = ndimage.binary_dilation(_connected(start | (unseen & (beyond > 0)), start), _CROSS)
-    return np.where(unseen & reached, np.maximum(value, np.clip(beyond / truncation, -1.0, 1.0)), value)
+    reached = ndimage.binary_propagation(start, mask=start | (unseen & (beyond > 0)))
+    opened = unseen & ndimage.binary_dilation(reached, _CROSS)
+    return np.where(opened, np.maximum(value, np.clip(beyond / truncation, -1.0, 1.0)), value)
 
 
 def _beyond_wall_inside(
@@ -86,12 +85,6 @@ def _beyond(distance: np.ndarray, edge: np.ndarray) -> np.ndarray:
 def _seen_at(seen: np.ndarray, nearest: np.ndarray) -> np.ndarray:
     """Return whether something was seen (nx, ny) at the nearest places (2, nx, ny)."""
     return ndimage.binary_dilation(seen, iterations=2)[tuple(nearest)]
-
-
-def _connected(wanted: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """Return which of the wanted places (nx, ny) of a level a way leads to from the start, which is among them."""
-    labels, _ = ndimage.label(wanted, _CROSS)
-    return np.isin(labels, np.unique(labels[start & wanted]))
 
 
 def _without_handles(body: np.ndarray, voxel_m: float) -> np.ndarray:

@@ -34,13 +34,10 @@ def beside(mesh: Any) -> np.ndarray | None:
 
 def _pieces(mesh: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the piece (F,) of each triangle, and the corners (P, 3), (P, 3) of the box around each."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
+    from trimesh.graph import connected_component_labels
 
-    a, b, c = mesh.faces.T
-    ends = np.concatenate([a, b]), np.concatenate([b, c])
-    graph = coo_matrix((np.ones(len(ends[0]), bool), ends), shape=(len(mesh.vertices),) * 2)
-    used, piece = np.unique(connected_components(graph, directed=False)[1][a], return_inverse=True)
+    labels = connected_component_labels(mesh.edges, node_count=len(mesh.vertices))
+    used, piece = np.unique(labels[mesh.faces[:, 0]], return_inverse=True)
     low, high = np.full((len(used), 3), np.inf), np.full((len(used), 3), -np.inf)
     np.minimum.at(low, piece, mesh.triangles.min(axis=1))
     np.maximum.at(high, piece, mesh.triangles.max(axis=1))

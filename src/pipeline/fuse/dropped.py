@@ -101,11 +101,9 @@ def _from_points(dropped: DroppedMesh, rng: np.random.Generator) -> tuple[Mesh, 
         whole, facts = mending.mended(mesh, None, file, rng)
         whole, done = _holding(whole, up, file)
         sound = holds(whole)
-    except mending.SomethingBeside:
+    except mending.Certain:
         raise
-    except PipelineError as error:
-        if "`up:" in str(error):
-            raise
+    except PipelineError:
         sound = False
     if not sound:
         raise PipelineError(
@@ -151,7 +149,7 @@ def _holding(mesh: Mesh, up: str, file: str) -> tuple[Mesh, dict[str, Any]]:
     turned = {other: frames.apply(upright(mesh[0], other), mesh[0]) for other in UPS if other != "z"}
     for axis, vertices in turned.items():
         if holds((vertices, mesh[1])):
-            raise PipelineError(
+            raise mending.Certain(
                 f"{file}: expected a container whose opening points along {up}, found that it points along {_named(up, axis)}; "
                 f"write `up: {_named(up, axis)}` into scan.yaml beside it"
             )

@@ -31,8 +31,8 @@ class Hole:
     high_m: float
 
 
-class SomethingBeside(PipelineError):
-    """There is another thing beside the object."""
+class Certain(PipelineError):
+    """What is wrong is known, however closely the object was scanned."""
 
 
 def mended(
@@ -239,7 +239,7 @@ def _check_alone(result: Mesh, file: str) -> None:
     if other is not None:
         x, y, z = (f"{v:.0f}" for v in 1000 * other.mean(axis=0))
         width = 1000 * np.ptp(other, axis=0).max()
-        raise SomethingBeside(
+        raise Certain(
             f"{file}: expected a container alone, found something {width:.0f} mm wide apart from it at "
             f"({x}, {y}, {z}) mm of the upright object; remove it, or join them, where you made the file"
         )

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.errors import PipelineError
-from pipeline.fuse import levelled, placement, registration, table
+from pipeline.fuse import levelled, placement, registration, table, turning
 from pipeline.fuse.raw import Views
 from pipeline.fuse.table import Placement, Plane
 from pipeline.geometry import frames
@@ -49,7 +49,7 @@ def refined(
             stood.append(levelled.shown(views, i, there, name))
     if len(stood) < registration.LEAST_VIEWS:
         return None
-    poses = registration.swept(stood, [np.eye(4)] * len(stood), rng)
+    poses = turning.swept(stood, [np.eye(4)] * len(stood), rng)
     known = replace(place, T_object_world=np.eye(4))
     poses, _ = registration.fitted_to_surface(stood, poses, views, name, rng, known)
     posed = registration.posed(views, stood, poses)

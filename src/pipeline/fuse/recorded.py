@@ -60,20 +60,16 @@ def complaints(facts: dict[str, Any]) -> list[str]:
     told = []
     off_m, as_given = facts["poses_off_m"] or 0.0, facts["poses"] == "given"
     if off_m > posing.OFF_M:
-        done = (
-            "fused as given, as too little is seen to refine them"
-            if as_given
-            else "refined on table and object"
-        )
+        refused = "fused as given, as too little is seen to refine them"
+        done = refused if as_given else "refined on table and object"
         told.append(
             f"the poses are off by {1e3 * off_m:.1f} mm, by the table in each view; they were {done}; "
             "calibrate the camera's pose better"
         )
-    if facts["table_spread_m"] > NOISY_M and not (
-        told and as_given
-    ):  # else it is the poses that spread the points
+    by_poses, spread_m = told and as_given, facts["table_spread_m"]
+    if spread_m > NOISY_M and not by_poses:
         told.append(
-            f"depth is noisy: points of the table spread by {1e3 * facts['table_spread_m']:.1f} mm, which tears thin walls; "
+            f"depth is noisy: points of the table spread by {1e3 * spread_m:.1f} mm, which tears thin walls; "
             "record from nearer, more views, or the mean of several images a view"
         )
     return told
