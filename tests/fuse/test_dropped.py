@@ -1,5 +1,7 @@
 """Meshes that a user drops: oriented, repaired, upright, in metres."""
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -148,3 +150,74 @@ def test_another_thing_beside_a_sheet_is_refused(tmp_path):
     (tmp_path / "cup" / "scan.yaml").write_text("wall_mm: 3\n")
     with pytest.raises(PipelineError, match="apart from it"):
         drop(tmp_path / "cup", both.vertices, both.faces)
+
+
+def turned(*profile_mm: tuple[float, float]) -> trimesh.Trimesh:
+    return trimesh.creation.revolve(np.array(profile_mm) / 1e3, sections=64)
+
+
+def thin_cup(radius_mm: float, height_mm: float, wall_mm: float) -> trimesh.Trimesh:
+    """A cup, cut in its wall at half its height."""
+    half, inner = height_mm / 2, radius_mm - wall_mm
+    outside = [(0, 0), (radius_mm, 0), (radius_mm, half), (radius_mm, height_mm)]
+    return turned(*outside, (inner, height_mm), (inner, half), (inner, wall_mm), (0, wall_mm))
+
+
+def dropped(folder, *pieces: trimesh.Trimesh):
+    whole = trimesh.util.concatenate(pieces)
+    return drop(folder, whole.vertices, whole.faces)
+
+
+def capacity_ml(result) -> float:
+    return 1e6 * cavity(*result.mesh, name="cup").capacity_m3
+
+
+def test_a_handle_that_sticks_in_a_thin_wall_is_joined_exactly(tmp_path):
+    cup = thin_cup(38, 240, 0.5)
+    handle = trimesh.creation.torus(0.03, 0.004).apply_translation([0.067, 0, 0])
+    turn = trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0], [0.067, 0, 0])
+    handle.apply_transform(turn).apply_translation([0, 0, 0.1])
+    result = dropped(tmp_path / "thermos", cup, handle)
+    union = trimesh.boolean.union([cup, handle], engine="manifold")
+    assert trimesh.Trimesh(*result.mesh).volume == pytest.approx(union.volume, rel=1e-6)
+    assert result.report["watertight"]
+    assert not result.report["mended"]["remeshed"]
+    assert capacity_ml(result) == pytest.approx(capacity_ml(dropped(tmp_path / "bare", cup)), rel=0.003)
+
+
+def test_a_thin_wall_is_not_lost_between_cells(tmp_path):
+    within = turned((14.5, 20), (15, 20))  # triangles within the wall, so that more than two meet at an edge
+    result = dropped(tmp_path / "cup", thin_cup(15, 40, 0.5), within)
+    assert result.report["mended"]["remeshed"]
+    assert capacity_ml(result) == pytest.approx(np.pi * 14.5**2 * 39.5 / 1e3, rel=0.015)
+
+
+def test_a_wall_too_thin_to_be_closed_is_named(tmp_path):
+    within = turned((149.7, 30), (150, 30))
+    with pytest.raises(
+        PipelineError, match=r"wall of at least 1\.9 mm, found open parts with a wall of 0\.3 mm"
+    ):
+        dropped(tmp_path / "pan", thin_cup(150, 60, 0.3), within)
+
+
+@pytest.mark.parametrize("radius_mm", [36.5, 37.5])  # not quite as wide as the inside, and into the wall
+def test_liquid_in_a_mesh_is_told(tmp_path, radius_mm):
+    liquid = turned((0, 3), (radius_mm, 3), (radius_mm, 60), (0, 60))
+    result = dropped(tmp_path / "mug", thin_cup(40, 90, 3), liquid)
+    (told,) = result.complaints
+    assert "level top 60 mm above the base is taken for the floor" in told
+    assert re.search(r"without it 37\d ml go in instead of 12\d: if it is liquid, remove it", told)
+
+
+def test_a_sheet_of_liquid_in_a_mesh_is_named(tmp_path):
+    with pytest.raises(
+        PipelineError, match="level sheet in it, as of liquid, 60 mm above its base; remove it"
+    ):
+        dropped(tmp_path / "mug", thin_cup(40, 90, 3), turned((0, 60), (36.9, 60)))
+
+
+def test_a_floor_made_for_itself_is_no_liquid(tmp_path):
+    tube = turned((40, 0), (40, 90), (37, 90), (37, 0), (40, 0))
+    result = dropped(tmp_path / "mug", tube, turned((0, 0), (37.5, 0), (37.5, 4), (0, 4)))
+    assert result.complaints == ()
+    assert capacity_ml(result) == pytest.approx(np.pi * 37**2 * 86 / 1e3, rel=0.01)

@@ -1,12 +1,13 @@
 """A mesh or a point cloud that a user dropped: read, repaired, put upright on z = 0."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pipeline.errors import PipelineError
-from pipeline.fuse import clouds, drains, mending, raw, standing
+from pipeline.fuse import clouds, drains, mending, parts, raw, standing
 from pipeline.fuse.raw import UPS, DroppedMesh
 from pipeline.fuse.table import Placement
 from pipeline.fuse.wrapping import Mesh, wrapped
@@ -17,6 +18,7 @@ from pipeline.geometry.sampling import uniform_points
 LARGEST_M, SMALLEST_M = 2.0, 0.005
 LARGEST_UNTOLD_M = 0.6  # without `units`: a mesh of unit size is as likely one that was normalised
 LEAST_IN_MM, MOST_IN_CM = 30.0, 60.0  # between them both may be meant
+MORE_WITHOUT = 1.1  # times as much goes in without a part that may be liquid
 CLOUDS = (".pcd", ".npz")
 TABLE_SAMPLES = 100_000
 _OF_IMAGES = {"depth_scale": "it has no depth images", "turntable_deg": "it has no views"}
@@ -55,9 +57,61 @@ def _from_mesh(
     mesh.vertices = frames.apply(T_object_world, mesh.vertices)
     mesh = mending.cleaned(mesh, file)
     _check_size(mesh.vertices, dropped, LARGEST_UNTOLD_M)
-    whole, facts = mending.mended(mesh, options.wall_m, file, rng)
+    emptied = _without_filling(mesh, options.wall_m, file)
+    try:
+        whole, facts = mending.mended(mesh, options.wall_m, file, rng)
+    except PipelineError as error:
+        if emptied is None:
+            raise
+        raise PipelineError(
+            f"{file}: expected a container alone, found a level sheet in it, as of liquid, {1000 * emptied.level_m:.0f} mm above "
+            "its base; remove it where you made the mesh"
+        ) from error
     whole, done = _holding(whole, up, file)
-    return whole, T_object_world, {"layout": "mesh", "n_views": 0, "mended": facts | done}
+    facts |= done | ({} if emptied is None else emptied.facts(whole))
+    return whole, T_object_world, {"layout": "mesh", "n_views": 0, "mended": facts}
+
+
+@dataclass(frozen=True)
+class _Emptied:
+    """What a mesh holds (m³) without a part whose level top is in it, level_m above its base."""
+
+    level_m: float
+    capacity_m3: float
+
+    def facts(self, whole: Mesh) -> dict[str, Any]:
+        """Return the level, and what goes in with and without the part, where that is a difference."""
+        with_m3 = cavity(*whole, name="").capacity_m3 if mending.holds(whole) else 0.0
+        if self.capacity_m3 < MORE_WITHOUT * with_m3:
+            return {}
+        return {"filled_to_m": self.level_m, "capacity_m3": with_m3, "capacity_without_m3": self.capacity_m3}
+
+
+def _without_filling(mesh: Any, wall_m: float | None, file: str) -> _Emptied | None:
+    """Return what an upright trimesh holds without what fills it, where there is such a part and the rest is a container."""
+    filling = parts.filling(mesh)
+    if filling is None:
+        return None
+    rest = mesh.submesh([~filling], append=True, repair=False)
+    try:
+        whole, _ = mending.mended(rest, wall_m, file, np.random.default_rng(0))
+        capacity_m3 = cavity(*whole, name="").capacity_m3
+    except PipelineError:
+        return None
+    return _Emptied(float(mesh.triangles[filling][..., 2].max()), capacity_m3)
+
+
+def complaints(facts: dict[str, Any]) -> list[str]:
+    """Return what a user should know of a dropped mesh or cloud, a sentence each, from what was found."""
+    told = clouds.complaints(facts["cloud"]) if "cloud" in facts else []
+    mended = facts["mended"]
+    if "filled_to_m" in mended:
+        ml = 1e6 * np.array([mended["capacity_without_m3"], mended["capacity_m3"]])
+        told.append(
+            f"a part of the mesh with a level top {1000 * mended['filled_to_m']:.0f} mm above the base is taken for the floor; "
+            f"without it {ml[0]:.0f} ml go in instead of {ml[1]:.0f}: if it is liquid, remove it where you made the mesh"
+        )
+    return told
 
 
 def _on_table(mesh: Any, dropped: DroppedMesh, rng: np.random.Generator) -> Placement | None:
@@ -100,7 +154,7 @@ def _from_points(dropped: DroppedMesh, rng: np.random.Generator) -> tuple[Mesh, 
         mesh = mending.cleaned(trimesh.Trimesh(*surface, process=False), file)
         whole, facts = mending.mended(mesh, None, file, rng)
         whole, done = _holding(whole, up, file)
-        sound = holds(whole)
+        sound = mending.holds(whole)
     except mending.Certain:
         raise
     except PipelineError:
@@ -141,14 +195,14 @@ def _load(path: Path) -> Any:
 
 def _holding(mesh: Mesh, up: str, file: str) -> tuple[Mesh, dict[str, Any]]:
     """Return the mesh with small holes closed if it leaks; refuse it when its opening points elsewhere."""
-    if holds(mesh):
+    if mending.holds(mesh):
         return mesh, {"drains_closed": 0}
     field, n = drains.plugged(wrapped(*mesh))
-    if n and holds(field.surface()):
+    if n and mending.holds(field.surface()):
         return field.surface(), {"drains_closed": n, "remeshed": True}
     turned = {other: frames.apply(upright(mesh[0], other), mesh[0]) for other in UPS if other != "z"}
     for axis, vertices in turned.items():
-        if holds((vertices, mesh[1])):
+        if mending.holds((vertices, mesh[1])):
             raise mending.Certain(
                 f"{file}: expected a container whose opening points along {up}, found that it points along {_named(up, axis)}; "
                 f"write `up: {_named(up, axis)}` into scan.yaml beside it"
@@ -161,15 +215,6 @@ def _named(up: str, axis: str) -> str:
     direction = _rotation(up).T @ _rotation(axis).T[:, 2]
     k = int(np.argmax(np.abs(direction)))
     return ("-" if direction[k] < 0 else "") + "xyz"[k]
-
-
-def holds(mesh: Mesh) -> bool:
-    """Return whether an upright mesh (vertices (V, 3), triangles (F, 3)) holds liquid."""
-    try:
-        cavity(*mesh, name="")
-    except PipelineError:
-        return False
-    return True
 
 
 def _check_size(vertices_m: np.ndarray, dropped: DroppedMesh, largest_m: float) -> None:

@@ -11,7 +11,7 @@ from pipeline.artefacts import Mesh
 from pipeline.columns import Columns
 from pipeline.command import untold
 from pipeline.errors import PipelineError
-from pipeline.fuse import clouds, coverage, dropped, layouts, recorded, tsdf
+from pipeline.fuse import coverage, dropped, layouts, recorded, tsdf
 from pipeline.fuse.cloud import cloud
 from pipeline.geometry.sampling import triangle_areas_and_normals
 from pipeline.geometry.surface import Surface, is_closed
@@ -55,9 +55,8 @@ def fused(
         vertices, triangles, T_object_world, facts = dropped.read(raw, rng)
         every = np.ones(len(vertices), bool)
         surface = tsdf.Surface(vertices, triangles, every, ~every)
-        told = clouds.complaints(facts["cloud"]) if "cloud" in facts else []
         result = _result(surface, n_points, False, rng, facts | _mesh_facts(T_object_world, raw))
-        return replace(result, complaints=tuple(told))
+        return replace(result, complaints=tuple(dropped.complaints(facts)))
     tell("poses, table and object")
     scan = recorded.located(raw, str(folder), rng)
     tell("the surface")

@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 
 from pipeline.errors import PipelineError
-from pipeline.fuse import crumbs
-from pipeline.fuse.wrapping import Mesh, wrapped
+from pipeline.fuse import crumbs, parts
+from pipeline.fuse.wrapping import Mesh, thickness_m, wrapped
 from pipeline.geometry import sampling
+from pipeline.geometry.cavity import cavity
 from pipeline.geometry.surface import Surface
 
 MOST_TRIANGLES = 3_000_000
@@ -67,9 +68,14 @@ def mended(
         facts["holes_closed"] = len(found)
     if sound(mesh):
         return arrays(mesh), facts
-    result = wrapped(*arrays(mesh)).surface()
+    whole = parts.united(mesh)
+    if whole is not None:
+        return whole, facts
+    field = wrapped(*arrays(mesh))
+    result = field.surface()
     _check_kept(mesh, result, file)
     _check_alone(result, file)
+    _check_thick(mesh, result, field.cell_m, file)
     return result, facts | {"remeshed": True}
 
 
@@ -229,6 +235,25 @@ def _check_kept(mesh: Any, result: Mesh, file: str) -> None:
         raise PipelineError(
             f"{file}: expected a surface that encloses a solid, found {mesh.body_count} parts that do not; "
             "make it one closed mesh where you made it"
+        )
+
+
+def holds(mesh: Mesh) -> bool:
+    """Return whether an upright mesh (vertices (V, 3), triangles (F, 3)) holds liquid."""
+    try:
+        cavity(*mesh, name="")
+    except PipelineError:
+        return False
+    return True
+
+
+def _check_thick(mesh: Any, result: Mesh, cell_m: float, file: str) -> None:
+    """Refuse when the wall was lost between cells, so that nothing goes in."""
+    wall_m = thickness_m(*arrays(mesh))
+    if wall_m < cell_m and not holds(result):
+        raise Certain(
+            f"{file}: expected a closed mesh, or a wall of at least {1000 * cell_m:.1f} mm, found open parts with a wall of "
+            f"{1000 * wall_m:.1f} mm, too thin to be closed here; join the parts to one closed mesh where you made the file"
         )
 
 

@@ -5,9 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+from pipeline.geometry.sampling import triangle_areas_and_normals, uniform_points
 from pipeline.geometry.surface import Surface, subdivided
 
 LEAST_CELL_M, CELLS = 0.0006, 160  # along the longest side
+MOST_CELLS = 16e6  # where the wall is thin
+OF_WALL, SAMPLES = 0.6, 2000  # a wall that is thinner than a cell is lost; points tell how thick it is
 _NEIGHBOURS = sorted(
     (offset for offset in np.ndindex(3, 3, 3) if offset != (1, 1, 1)),
     key=lambda o: (np.abs(np.array(o) - 1).sum(), o),
@@ -43,9 +46,14 @@ def wrapped(vertices_m: np.ndarray, triangles: np.ndarray, wall_m: float | None 
     Parts that overlap become one, what is hidden goes, holes narrower than a cell close. With `wall_m`, the triangles are
     the middle of a wall of this thickness.
     """
-    cell = max(LEAST_CELL_M, float(np.ptp(vertices_m, axis=0).max()) / CELLS)
+    size_m = np.ptp(vertices_m, axis=0)
+    cell = max(LEAST_CELL_M, float(size_m.max()) / CELLS)
     if wall_m is not None:
         cell = min(cell, wall_m / 2.5)
+    else:
+        thick = thickness_m(vertices_m, triangles)
+        fine = max(OF_WALL * thick, float(np.cbrt(size_m.prod() / MOST_CELLS)))
+        cell = min(cell, fine) if fine < thick else cell
     vertices_m, triangles = subdivided(vertices_m, triangles, 3 * cell)
     margin = (wall_m or 0.0) / 2 + 3 * cell
     low, high = vertices_m.min(axis=0) - margin, vertices_m.max(axis=0) + margin
@@ -58,6 +66,15 @@ def wrapped(vertices_m: np.ndarray, triangles: np.ndarray, wall_m: float | None 
     value = wall_m / 2 - distance
     labels, _ = ndimage.label(value < 0)
     return Field(np.where((value < 0) & (labels != labels[0, 0, 0]), cell, value), low, cell)
+
+
+def thickness_m(vertices_m: np.ndarray, triangles: np.ndarray) -> float:
+    """Return how thick the wall of vertices (V, 3) and triangles (F, 3) is: how near another triangle is, as a median."""
+    points, triangle = uniform_points(vertices_m, triangles, SAMPLES, np.random.default_rng(0))
+    normals = triangle_areas_and_normals(vertices_m, triangles)[1][triangle]
+    surface, off_m = Surface(vertices_m, triangles), 1e-5
+    sides = [surface.hit(points + side * off_m * normals, side * normals) for side in (1.0, -1.0)]
+    return float(np.median(np.minimum(*sides))) + off_m
 
 
 def _outside(surface: Surface, centres: np.ndarray, distance: np.ndarray, cell: float) -> np.ndarray:
