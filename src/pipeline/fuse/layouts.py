@@ -13,8 +13,8 @@ from pipeline.fuse.recordings.frame import Frame
 
 __all__ = ["DroppedMesh", "Options", "Views", "read"]
 
-MESHES = (".ply", ".obj", ".stl", ".glb", ".off")
-CLOUDS = (".pcd", ".npz")
+MESHES = (".ply", ".obj", ".stl", ".glb", ".gltf", ".off")
+CLOUDS = (".pcd", ".xyz", ".npz")
 RECORDINGS = {"7-scenes": seven_scenes, "open3d": open3d_folders, "tum": tum, "bop": bop}
 MOST_VIEWS = 200
 # Names of what holds poses in other layouts: views beside it were not meant to be without.
