@@ -22,7 +22,7 @@ OPTIONS = {"voxel_m": 0.003, "truncation_m": 0.006, "n_points": 5000, "seed": 2}
 OUTPUTS = ("mesh.ply", "cloud.parquet", "fusion.json")
 STRIDE = 2  # of the images' pixels
 MESHES = ("ply", "obj", "stl", "glb", "off")
-CLOUDS = ("npz", "pcd")
+CLOUDS = ("npz", "pcd", "xyz")
 
 
 def sources(folder: Path) -> list[Path]:

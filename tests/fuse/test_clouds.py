@@ -6,7 +6,7 @@ import pytest
 import trimesh
 
 from pipeline.errors import PipelineError
-from pipeline.fuse import clouds
+from pipeline.fuse import clouds, layouts
 from pipeline.fuse.fusion import fused
 from pipeline.geometry import frames
 from pipeline.geometry.cavity import cavity
@@ -173,3 +173,19 @@ def test_another_thing_in_the_cloud_is_refused(tmp_path):
     write(tmp_path / "cup" / "cup.ply", other, np.concatenate([normals, ball.vertex_normals]))
     with pytest.raises(PipelineError, match="apart from it"):
         fused(tmp_path / "cup", **OPTIONS)
+
+
+def test_a_cloud_as_text_is_read(tmp_path):
+    places, _ = points()
+    write(tmp_path / "cup.xyz", places, None)
+    found, normals = clouds.read(layouts.read(tmp_path).path)
+    np.testing.assert_allclose(found, np.unique(places, axis=0), atol=1e-9)
+    assert normals is None
+
+
+def test_room_for_normals_is_no_normals(tmp_path):
+    places, _ = points()
+    write(tmp_path / "cup.pcd", places, np.zeros_like(places))
+    found, normals = clouds.read(tmp_path / "cup.pcd")
+    assert len(found) == len(places)
+    assert normals is None

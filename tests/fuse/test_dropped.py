@@ -35,6 +35,53 @@ def test_every_format(tmp_path, suffix):
     assert mesh.volume == pytest.approx(trimesh.Trimesh(cup.vertices_m, cup.triangles).volume, rel=1e-4)
 
 
+def test_the_files_beside_a_gltf_belong_to_it(tmp_path):
+    cup = shape("small_cup")
+    scene = trimesh.Scene(trimesh.Trimesh(cup.vertices_m, cup.triangles))
+    for name, data in trimesh.exchange.gltf.export_gltf(scene).items():
+        (tmp_path / name).write_bytes(data)
+    vertices, _ = fused(tmp_path, **OPTIONS).mesh
+    np.testing.assert_allclose(np.ptp(vertices, axis=0), [0.055, 0.055, 0.06], atol=1e-5)
+    (tmp_path / "gltf_buffer_0.bin").unlink()
+    with pytest.raises(PipelineError, match=r"cannot be read: gltf_buffer_0\.bin; put that file beside it"):
+        fused(tmp_path, **OPTIONS)
+
+
+RINGS = [(i, (i + 1) % 4) for i in range(4)]
+SQUARE_CUP = [
+    (3, 2, 1, 0),
+    (12, 13, 14, 15),
+    *((k + i, k + j, k + 4 + j, k + 4 + i) for k in (0, 4, 8) for i, j in RINGS),
+]
+
+
+def polygons(path, faces: list[tuple[int, ...]]) -> None:
+    """Write a square cup as a binary file of polygons, whose texture is elsewhere."""
+    rings = [(0.04, 0.0), (0.04, 0.09), (0.037, 0.09), (0.037, 0.004)]
+    corners = [(r * x, r * y, z) for r, z in rings for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    axes = "".join(f"property float {axis}\n" for axis in "xyz")
+    header = f"ply\nformat binary_little_endian 1.0\ncomment TextureFile cup.png\nelement vertex 16\n{axes}"
+    header += f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+    indices = b"".join(np.uint8(len(face)).tobytes() + np.array(face, "<i4").tobytes() for face in faces)
+    path.write_bytes(header.encode() + np.array(corners, "<f4").tobytes() + indices)
+
+
+def test_faces_of_four_corners_are_read_and_a_missing_texture_is_no_traceback(tmp_path, caplog):
+    polygons(tmp_path / "cup.ply", SQUARE_CUP)
+    vertices, triangles = fused(tmp_path, **OPTIONS).mesh
+    capacity_m3 = cavity(vertices, triangles, name="cup").capacity_m3
+    assert capacity_m3 == pytest.approx(0.074**2 * 0.086, rel=0.01)
+    assert caplog.records == []
+
+
+def test_faces_of_three_and_of_four_corners_are_asked_for_as_triangles(tmp_path):
+    polygons(tmp_path / "cup.ply", [*SQUARE_CUP[1:], (3, 2, 1), (3, 1, 0)])
+    with pytest.raises(
+        PipelineError, match=r"cup\.ply: .* cannot be read: .*; export it again, with triangles alone"
+    ):
+        fused(tmp_path, **OPTIONS)
+
+
 @pytest.mark.parametrize(
     ("up", "T_file_object"),
     [

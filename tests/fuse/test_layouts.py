@@ -1,15 +1,20 @@
 """One virtual scan in every layout gives one surface; each common mistake has a sentence of its own."""
 
+import json
+from dataclasses import replace
+
 import numpy as np
+import open3d as o3d
 import pytest
 import trimesh
-from fuse import writers
+from fuse import scenes, writers
 
 from pipeline.errors import PipelineError
 from pipeline.fuse import agreement, layouts
 from pipeline.fuse.fusion import fused
+from pipeline.geometry import frames
 from pipeline.geometry.surface import Surface
-from pipeline.scan import recording
+from pipeline.scan import camera, recording
 from pipeline.scan.shapes import shape
 
 OPTIONS = {"voxel_m": 0.002, "truncation_m": 0.004, "n_points": 5000, "seed": 2}
@@ -57,6 +62,99 @@ def test_every_layout_reads_the_same_views(recorded, tmp_path, layout):
     np.testing.assert_allclose(centres, np.tile([-320.5, -240.5], (len(recorded), 1)))
 
 
+def by_open3d(folder, recorded) -> None:
+    """Write Open3D's folder, the poses by Open3D itself."""
+    writers.open3d(folder, recorded)
+    (folder / "trajectory.log").unlink()
+    trajectory = o3d.camera.PinholeCameraTrajectory()
+    views = []
+    for _, T in recorded:
+        views.append(o3d.camera.PinholeCameraParameters())
+        views[-1].extrinsic = np.linalg.inv(T)
+    trajectory.parameters = views
+    o3d.io.write_pinhole_camera_trajectory(str(folder / "trajectory.json"), trajectory)
+
+
+def of_reconstruction(folder, recorded) -> None:
+    """Write what Open3D's recorder and its reconstruction leave."""
+    writers.open3d(folder, recorded)
+    (folder / "scene").mkdir()
+    (folder / "trajectory.log").rename(folder / "scene/trajectory.log")
+    (folder / "camera_intrinsic.json").rename(folder / "intrinsic.json")
+
+
+def scannet(folder, recorded) -> None:
+    """Write a pose a view, and a camera of 4×4."""
+    writers.open3d(folder, recorded)
+    for name in ("trajectory.log", "camera_intrinsic.json"):
+        (folder / name).unlink()
+    for name in ("pose", "intrinsic"):
+        (folder / name).mkdir()
+    for i, (_, T) in enumerate(recorded):
+        np.savetxt(folder / f"pose/{i:05d}.txt", T)
+    K = np.eye(4)
+    K[:3, :3] = camera.intrinsics()
+    np.savetxt(folder / "intrinsic/intrinsic_depth.txt", K)
+
+
+@pytest.mark.parametrize("write", [by_open3d, of_reconstruction, scannet])
+def test_the_poses_of_a_folder_with_depth_are_found(recorded, tmp_path, write):
+    write(tmp_path, recorded)
+    views = layouts.read(tmp_path)
+    np.testing.assert_allclose(views.T_world_cameras, [T for _, T in recorded], atol=1e-9)
+    np.testing.assert_allclose(views.intrinsics, np.tile(camera.intrinsics(), (len(recorded), 1, 1)))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda found: found.pop("parameters"), ("the key parameters", "export it again")),
+        (lambda found: found["parameters"].pop(), ("each of the 10 images", "found 9")),
+        (lambda found: found["parameters"][3].pop("extrinsic"), ("an extrinsic",)),
+        (lambda found: found["parameters"][3]["extrinsic"].pop(), ("parameters 3: extrinsic", "16 numbers")),
+        (lambda found: found["parameters"][3]["extrinsic"].reverse(), ("parameters 3: extrinsic", "rigid")),
+    ],
+)
+def test_a_wrong_trajectory_names_file_and_key(recorded, tmp_path, change, words):
+    by_open3d(tmp_path, recorded)
+    path = tmp_path / "trajectory.json"
+    found = json.loads(path.read_text())
+    change(found)
+    path.write_text(json.dumps(found))
+    with pytest.raises(PipelineError) as caught:
+        layouts.read(tmp_path)
+    assert all(word in str(caught.value) for word in (str(path), *words)), caught.value
+
+
+@pytest.mark.parametrize("name", ["poses.txt", "Camera_Pose", "transforms.json", "cameras", "odometry.csv"])
+def test_poses_that_are_not_read_are_named(recorded, tmp_path, name):
+    writers.open3d(tmp_path, recorded)
+    (tmp_path / "trajectory.log").rename(tmp_path / name)
+    with pytest.raises(
+        PipelineError, match=rf"expected poses in trajectory\.log, found {name}, which is not"
+    ):
+        layouts.read(tmp_path)
+    (tmp_path / name).rename(tmp_path / "exposure.txt")
+    assert layouts.read(tmp_path).T_world_cameras == []
+
+
+def test_a_camera_of_images_of_another_size_is_named(recorded, tmp_path):
+    writers.open3d(tmp_path, recorded)
+    path = tmp_path / "camera_intrinsic.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"width": 1280, "height": 720}))
+    with pytest.raises(
+        PipelineError, match=r"camera_intrinsic\.json: .* 640×480 pixels, found one of 1280×720;"
+    ):
+        layouts.read(tmp_path)
+
+
+def test_what_is_written_into_the_file_of_intrinsics_is_said(recorded, tmp_path):
+    writers.open3d(tmp_path, recorded)
+    (tmp_path / "camera_intrinsic.json").unlink()
+    with pytest.raises(PipelineError, match="add it: fx 0 cx / 0 fy cy / 0 0 1 in pixels"):
+        layouts.read(tmp_path)
+
+
 def said(folder, recorded) -> str:
     writers.open3d(folder, recorded)
     with pytest.raises(PipelineError) as caught:
@@ -95,6 +193,31 @@ MM = np.array([[1, 1, 1, 1000.0]] * 3 + [[1, 1, 1, 1]])
 def test_each_mistake_in_poses_is_named(recorded, tmp_path, change, words):
     message = said(tmp_path, _moved(recorded, change))
     assert all(word in message for word in words), message
+
+
+@pytest.mark.parametrize("factor", [0.95, 1.03])
+def test_a_unit_of_depth_that_is_a_little_off_is_named(recorded, tmp_path, factor):
+    message = said(tmp_path, [(np.round(depth * factor), T) for depth, T in recorded])
+    assert float(message.split("depth_scale: ")[1].split("`")[0]) == pytest.approx(1000 * factor, rel=0.005)
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.05])
+def test_another_focal_length_is_named(recorded, tmp_path, factor):
+    views = read(tmp_path, recorded, "open3d")
+    wrong = replace(views, intrinsics=views.intrinsics * [[factor, 1, 1], [1, factor, 1], [1, 1, 1]])
+    with pytest.raises(
+        PipelineError, match=r"focal length of about \d+ pixels .* correct the intrinsics"
+    ) as caught:
+        agreement.checked(wrong, "cup", np.random.default_rng(1))
+    focal = float(str(caught.value).split("about ")[1].split()[0])
+    assert focal == pytest.approx(camera.FOCAL_PX, rel=0.005)
+
+
+def test_poses_that_are_a_little_off_are_not_taken_for_another_scale(recorded, tmp_path):
+    views = read(tmp_path, recorded, "open3d")
+    behind = [T @ frames.transform(np.eye(3), np.array([0, 0, -0.01])) for T in views.T_world_cameras]
+    for off in (scenes.shaken(views, 0.003, 0.5), replace(views, T_world_cameras=behind)):
+        assert agreement.checked(off, "cup", np.random.default_rng(1))[1] == []
 
 
 @pytest.mark.parametrize(("factor", "scale"), [(5, "5000"), (10, "1e+04"), (0.25, "250")])

@@ -15,6 +15,13 @@ TOLERANCE_M, TOLERANCE_SHARE = 0.010, 0.01
 LEAST = 0.4  # of the points that another view could see: right poses reach 0.6 to 0.9, wrong ones 0.15
 LEAST_OF_A_VIEW = 0.2
 MOST_LEFT_OUT = 0.2  # of the views
+# Another focal length or unit of depth brings what views measure nearer, where that is what is wrong: from 9 mm to 1.6 with 10 % of
+# focal length; poses off at random, to 0.8 of it.
+SLIGHT, NEARER, MUCH_NEARER = 1.03, 0.9, 0.7
+WIDEST, STEPS = (1.5, 1.02), 41
+EVERY = 4  # of the points
+# Along the camera's axis another unit of depth and poses that are off look alike; less is refined.
+LEAST_ALONG_M = 0.015
 MUCH_MOVED = 0.05  # of the points above the table: flying pixels at edges are up to 0.03
 NEAREST_M, FURTHEST_M = 0.1, 10.0  # of what stands on a table, from a depth camera
 POINTS, PAIRS = 400, 200
@@ -47,6 +54,9 @@ def checked(views: Views, name: str, rng: np.random.Generator) -> tuple[Views, l
     left_out = [view for view, is_bad in zip(views.names, bad, strict=True) if is_bad]
     if np.median(np.nan_to_num(shares)) < LEAST or bad.mean() > MOST_LEFT_OUT:
         raise PipelineError(_named(views, sample, poses, float(np.nan_to_num(shares).mean()), left_out, name))
+    mistake = _of_scale(views, sample, poses, name)
+    if mistake is not None:
+        raise PipelineError(_sentence(mistake, name))
     return only(views, ~bad), left_out
 
 
@@ -177,7 +187,7 @@ def _named(
         if share > best + 0.02:  # of two that explain it alike, the simpler one, which comes first
             best, mistake = share, candidate
     if mistake is not None:
-        return f"{name}: expected poses camera→world in metres and depths that fit them, found {mistake.says}; {mistake.cure}"
+        return _sentence(mistake, name)
     if given < LEAST:
         return (
             f"{name}: expected views that agree with each other, found that they do not, nor with any common mistake corrected; "
@@ -187,6 +197,62 @@ def _named(
         f"{name}: expected poses that fit the images, found {len(left_out)} of {len(views.names)} views that others do not "
         f"agree with, such as {left_out[0]}; correct their poses or remove them"
     )
+
+
+def _sentence(mistake: Mistake, name: str) -> str:
+    return f"{name}: expected poses camera→world in metres and depths that fit them, found {mistake.says}; {mistake.cure}"
+
+
+def _of_scale(views: Views, sample: Sample, poses: np.ndarray, name: str) -> Mistake | None:
+    """Return what explains how far views are apart whose poses are about right: focal length or unit of depth some percent off."""
+    thinned = replace(sample, points_m=[points[::EVERY] for points in sample.points_m])
+
+    def apart_m(focal: float = 1.0, depth: float = 1.0) -> float:
+        return _apart_m(views, thinned, poses, focal, depth)
+
+    given_m = apart_m()
+    slight = (1 / SLIGHT, SLIGHT)
+    if min(*map(apart_m, slight), *(apart_m(depth=factor) for factor in slight)) > NEARER * given_m:
+        return None
+    focal, depth = _least(apart_m), _least(lambda factor: apart_m(depth=factor))
+    if min(focal, depth)[0] > MUCH_NEARER * given_m:
+        return None
+    if depth < focal:
+        off_m = abs(depth[1] - 1) * float(np.median(np.concatenate(thinned.points_m)[:, 2]))
+        found = _of_depth(views.depth_scale / depth[1], name)
+        or_else = f", or correct the poses, if they are {1e3 * off_m:.0f} mm off along the camera's axis"
+        return replace(found, cure=found.cure + or_else) if off_m > LEAST_ALONG_M else None
+    fx = views.intrinsics[0, 0, 0]
+    says = f"that they fit with a focal length of about {fx * focal[1]:.0f} pixels instead of {fx:.0f}"
+    cure = "correct the intrinsics: they are another camera's, or of images of another size"
+    return Mistake(says, cure, lambda T: T)
+
+
+def _least(apart_m: Callable[[float], float]) -> tuple[float, float]:
+    """Return the least distance that a factor leads to, and the factor."""
+    factor = 1.0
+    for widest in WIDEST:
+        factor = min((float(f) for f in factor * np.geomspace(1 / widest, widest, STEPS)), key=apart_m)
+    return apart_m(factor), factor
+
+
+def _apart_m(views: Views, sample: Sample, poses: np.ndarray, focal: float, depth: float) -> float:
+    """Return the median distance of what two views measure at a place, with another focal length and unit of depth."""
+    K = views.intrinsics * np.array([[focal, 1, 1], [1, focal, 1], [1, 1, 1]])
+    factors = depth / np.array([focal, focal, 1.0])
+    places = [frames.apply(T, points * factors) for T, points in zip(poses, sample.points_m, strict=True)]
+    apart = []
+    for j, T in enumerate(poses):
+        others = sample.pairs[sample.pairs[:, 1] == j, 0]
+        points = frames.apply(frames.inverse(T), np.concatenate([places[i] for i in others]))
+        measured, expected = projected(points, K[j], views.depths_m[j])
+        apart.append(np.abs(measured * depth - expected)[measured > 0])
+    return float(np.median(np.concatenate(apart)))
+
+
+def _of_depth(scale: float, name: str) -> Mistake:
+    cure = f"write `depth_scale: {scale:.4g}` into {Path(name) / 'scan.yaml'}"
+    return Mistake(f"depths that fit at about {scale:.4g} units per metre", cure, lambda T: T)
 
 
 def _mistakes(name: str, depth_scale: float) -> Iterator[Mistake]:
@@ -215,8 +281,7 @@ def _mistakes(name: str, depth_scale: float) -> Iterator[Mistake]:
         2000.0,
         *np.geomspace(depth_scale / 8, depth_scale * 8, 81),
     ):
-        says = f"depths that fit at about {scale:.4g} units per metre"
-        yield Mistake(says, f"write `depth_scale: {scale:.4g}` into {file}", lambda T: T, depth_scale / scale)
+        yield replace(_of_depth(scale, name), depth_factor=depth_scale / scale)
 
 
 def _scaled(factor: float) -> Callable[[np.ndarray], np.ndarray]:

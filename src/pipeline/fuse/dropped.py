@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.errors import PipelineError
 from pipeline.fuse import clouds, drains, mending, parts, raw, standing
+from pipeline.fuse.layouts import CLOUDS
 from pipeline.fuse.raw import UPS, DroppedMesh
 from pipeline.fuse.table import Placement
 from pipeline.fuse.wrapping import Mesh, wrapped
@@ -19,7 +20,6 @@ LARGEST_M, SMALLEST_M = 2.0, 0.005
 LARGEST_UNTOLD_M = 0.6  # without `units`: a mesh of unit size is as likely one that was normalised
 LEAST_IN_MM, MOST_IN_CM = 30.0, 60.0  # between them both may be meant
 MORE_WITHOUT = 1.1  # times as much goes in without a part that may be liquid
-CLOUDS = (".pcd", ".npz")
 TABLE_SAMPLES = 100_000
 _OF_IMAGES = {"depth_scale": "it has no depth images", "turntable_deg": "it has no views"}
 
@@ -178,11 +178,15 @@ def _load(path: Path) -> Any:
     """Return the mesh, or None when the file holds points without faces."""
     import trimesh
 
+    # It logs a missing texture with a traceback; none is needed.
+    trimesh.util.log.setLevel("CRITICAL")
     try:
         mesh = trimesh.load(path, force="mesh" if path.suffix.lower() != ".ply" else None, process=False)
     except Exception as error:  # each reader of trimesh has errors of its own
+        is_missing = isinstance(error, FileNotFoundError)
+        cure = "put that file beside it" if is_missing else "export it again, with triangles alone"
         raise PipelineError(
-            f"{path}: expected a mesh, but it cannot be read: {' '.join(str(error).split()):.200}; export it again"
+            f"{path}: expected a mesh, but it cannot be read: {' '.join(str(error).split()):.200}; {cure}"
         ) from error
     if isinstance(mesh, trimesh.PointCloud):
         return None

@@ -13,8 +13,16 @@ RIGID_TOLERANCE = 1e-3  # of R Rᵀ = 1: poses are often written with few digits
 MOST_PIXELS = 25_000_000
 MOST_BYTES = 50_000_000  # of a text file
 LARGEST_SIDE = 1300  # pixels; images are thinned to this
+DEPTHS, A_DEPTH = ("I;16", "I;16B", "I;16L", "I"), "a 16-bit depth image of one channel"
 INVALID = 65535  # 7-Scenes' mark of a pixel without depth
-INTRINSICS = ("camera-intrinsics.txt", "camera_intrinsics.txt", "camera_intrinsic.json", "intrinsics.txt")
+INTRINSICS = (
+    "camera-intrinsics.txt",
+    "camera_intrinsics.txt",
+    "camera_intrinsic.json",
+    "intrinsics.txt",
+    "intrinsic.json",  # Open3D's recorders
+    "intrinsic/intrinsic_depth.txt",  # ScanNet: 4×4
+)
 
 
 def in_order(name: str) -> tuple[list[str | int], str]:
@@ -80,8 +88,8 @@ def matrix(path: Path, size: int, what: str, cure: str = "add it") -> np.ndarray
     return numbers(rows(path, f"{what} ({size}×{size} numbers)", cure), (size, size), str(path), what)
 
 
-def intrinsics(folder: Path) -> tuple[np.ndarray, Path]:
-    """Return the camera's matrix (3, 3) and the file that holds it."""
+def intrinsics(folder: Path, image: Path) -> tuple[np.ndarray, Path]:
+    """Return the camera's matrix (3, 3) and the file that holds it; `image`: one of its depth images."""
     path = next((folder / name for name in INTRINSICS if (folder / name).is_file()), folder / INTRINSICS[0])
     if path.suffix == ".json":
         found = content(path, "the camera's intrinsics")
@@ -89,9 +97,24 @@ def intrinsics(folder: Path) -> tuple[np.ndarray, Path]:
             raise PipelineError(
                 f"{path}: expected the key intrinsic_matrix (9 numbers by columns), found {found!r:.60}; export it again"
             )
+        if "width" in found and "height" in found:
+            _check_size([found["width"], found["height"]], image, path)
         K = numbers(found["intrinsic_matrix"], (9,), f"{path}: intrinsic_matrix", "the camera's intrinsics")
         return camera(K.reshape(3, 3).T, str(path)), path
-    return camera(matrix(path, 3, "the camera's intrinsics"), str(path)), path
+    size = 3 if path.parent == folder else 4
+    K = matrix(path, size, "the depth camera's intrinsics", "add it: fx 0 cx / 0 fy cy / 0 0 1 in pixels")
+    return camera(K[:3, :3], str(path)), path
+
+
+def _check_size(size: list[Any], image: Path, where: Path) -> None:
+    """Refuse a camera whose images have another size (width, height) than the depth `image`."""
+    height, width = pixels(image, DEPTHS, A_DEPTH).shape
+    if size != [width, height]:
+        found = "×".join(f"{side!r:.20}" for side in size)
+        raise PipelineError(
+            f"{where}: expected the camera of images like {image.name}, {width}×{height} pixels, found one of {found}; write the "
+            "depth camera's own, or export depth aligned to colour"
+        )
 
 
 def camera(K: np.ndarray, where: str) -> np.ndarray:
@@ -120,7 +143,7 @@ def pose(T: np.ndarray, unit_m: float, where: str, direction: str = "camera→wo
 
 def depth(path: Path, depth_scale: float, K: np.ndarray, where_K: str) -> tuple[np.ndarray, np.ndarray]:
     """Return a depth image (H, W) float32 in metres, 0 where unknown, and its camera; large images are thinned."""
-    values = pixels(path, ("I;16", "I;16B", "I;16L", "I"), "a 16-bit depth image of one channel")
+    values = pixels(path, DEPTHS, A_DEPTH)
     height, width = values.shape
     if not (0 < K[0, 2] < width and 0 < K[1, 2] < height):
         raise PipelineError(

@@ -1,5 +1,6 @@
 """Which layout lies in data/raw/<object>/, recognised by content, and its reading."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,14 @@ from pipeline.fuse.recordings.frame import Frame
 
 __all__ = ["DroppedMesh", "Options", "Views", "read"]
 
-MESHES = (".ply", ".obj", ".stl", ".glb", ".off")
-CLOUDS = (".pcd", ".npz")
+MESHES = (".ply", ".obj", ".stl", ".glb", ".gltf", ".off")
+CLOUDS = (".pcd", ".xyz", ".npz")
 RECORDINGS = {"7-scenes": seven_scenes, "open3d": open3d_folders, "tum": tum, "bop": bop}
 MOST_VIEWS = 200
+# Names of what holds poses in other layouts: views beside it were not meant to be without.
+_POSES = re.compile(
+    r"(.*[^a-z])?poses?([^a-z].*)?|.*(traj|odom|ground_?truth|transforms).*|cameras(\..*)?", re.I
+)
 _OF_OTHERS = {"up": "up comes from the table", "wall_mm": "both sides of the wall are measured"}
 _EXPECTED = (
     "depth images (frame-NNNNNN.depth.png with frame-NNNNNN.pose.txt and camera-intrinsics.txt, or a folder of Open3D, TUM "
@@ -77,12 +82,17 @@ def _views(folder: Path, layout: str, names: list[str], options: Options) -> Vie
     frames = RECORDINGS[layout].frames(folder, names, options)
     kept = np.unique(np.linspace(0, len(frames) - 1, min(len(frames), MOST_VIEWS)).round().astype(int))
     chosen = [frames[i] for i in kept]
+    poses = [frame.T_world_camera for frame in chosen if frame.T_world_camera is not None]
+    if not poses and (unread := [name for name in names if _POSES.fullmatch(name)]):
+        raise PipelineError(
+            f"{folder}: expected poses in {RECORDINGS[layout].POSES}, found {unread[0]}, which is not read; write them there, or "
+            "remove it to have the views registered"
+        )
     images = [files.depth(frame.depth, frame.depth_scale, frame.K, frame.where_K) for frame in chosen]
     if not any(depth.any() for depth, _ in images):
         raise PipelineError(
             f"{folder}: expected depth in the images, found zeros in all {len(images)}; record it again"
         )
-    poses = [frame.T_world_camera for frame in chosen if frame.T_world_camera is not None]
     if poses:
         raw.refuse(
             options, folder / "scan.yaml", "views with poses", turntable_deg="their poses say how they turn"

@@ -15,7 +15,7 @@ from pipeline.errors import PipelineError
 from pipeline.pour.project import Project
 from pipeline.workflow.objects import NAME, RESERVED
 
-SUFFIXES = (".ply", ".obj", ".stl", ".glb", ".off", ".pcd", ".npz")
+SUFFIXES = (".ply", ".obj", ".stl", ".glb", ".off", ".pcd", ".xyz", ".npz")
 
 
 def options(parser: argparse.ArgumentParser) -> None:

@@ -11,7 +11,7 @@ from pipeline.fuse.raw import Options
 from pipeline.fuse.recordings.frame import Frame, colour
 from pipeline.geometry.frames import inverse
 
-CAMERAS = "scene_camera.json"
+CAMERAS = POSES = "scene_camera.json"
 
 
 def recognised(folder: Path, names: list[str]) -> bool:

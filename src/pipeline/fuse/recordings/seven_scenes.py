@@ -7,6 +7,7 @@ from pipeline.fuse import files
 from pipeline.fuse.raw import Options
 from pipeline.fuse.recordings.frame import Frame, colour
 
+POSES = "frame-NNNNNN.pose.txt"
 DEPTH = re.compile(r"(?P<stem>.*\d[._-]|.*\d)depth\.(png|PNG)")
 
 
@@ -17,8 +18,8 @@ def recognised(folder: Path, names: list[str]) -> bool:
 
 def frames(folder: Path, names: list[str], options: Options) -> list[Frame]:
     """Return the views; poses are camera→world, and none at all is allowed."""
-    K, where_K = files.intrinsics(folder)
     stems = {match["stem"]: name for name in names if (match := DEPTH.fullmatch(name))}
+    K, where_K = files.intrinsics(folder, folder / next(iter(stems.values())))
     posed = any((folder / f"{stem}pose.txt").exists() for stem in stems)
     found = []
     for stem, name in stems.items():

@@ -11,7 +11,7 @@ from pipeline.fuse.recordings.frame import Frame
 from pipeline.geometry import frames as rigid
 
 NEAREST_S = 0.02  # a view without a pose within this time is left out, as in the benchmark's own tools
-TRAJECTORY = "groundtruth.txt"
+POSES = TRAJECTORY = "groundtruth.txt"
 
 
 def recognised(folder: Path, names: list[str]) -> bool:
@@ -21,8 +21,8 @@ def recognised(folder: Path, names: list[str]) -> bool:
 
 def frames(folder: Path, names: list[str], options: Options) -> list[Frame]:
     """Return the views that have a pose at their time, or all of them when there are no poses."""
-    K, where_K = files.intrinsics(folder)
     times, images = _list(folder / "depth.txt")
+    K, where_K = files.intrinsics(folder, folder / images[0])
     poses: list[np.ndarray | None] = [None] * len(images)
     if (folder / TRAJECTORY).exists():
         poses = _at(times, *_trajectory(folder / TRAJECTORY, options.unit_m or 1.0))
