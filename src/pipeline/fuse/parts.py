@@ -23,10 +23,10 @@ def united(mesh: Any) -> Mesh | None:
         return None
     solids = []
     for part in mesh.submesh([np.flatnonzero(labels == k) for k in range(labels.max() + 1)]):
-        trimesh.repair.fix_normals(part, multibody=False)
-        if part.volume < 0:
-            part.invert()
-        solid = manifold3d.Manifold(manifold3d.Mesh64(part.vertices, part.faces.astype(np.uint64)))
+        trimesh.repair.fix_winding(part)
+        solid = _solid(part.vertices, part.faces)
+        if solid.volume() < 0:
+            solid = _solid(part.vertices, part.faces[:, ::-1])
         if solid.is_empty():
             return None
         solids.append(solid)
@@ -36,6 +36,12 @@ def united(mesh: Any) -> Mesh | None:
         return None
     result = bodies[0].to_mesh64()
     return np.asarray(result.vert_properties, float)[:, :3], np.asarray(result.tri_verts, np.int64)
+
+
+def _solid(vertices: np.ndarray, triangles: np.ndarray) -> Any:
+    import manifold3d
+
+    return manifold3d.Manifold(manifold3d.Mesh64(vertices, np.ascontiguousarray(triangles, np.uint64)))
 
 
 def filling(mesh: Any) -> np.ndarray | None:
