@@ -1,6 +1,7 @@
 """Cups of any wall on a table, scanned in memory: for tests, and for `benchmarks/fusion.py`, `arcs.py` and `poses.py`."""
 
 from dataclasses import replace
+from functools import lru_cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -33,9 +34,14 @@ def views(body: SimpleNamespace, n: int = 36, noise: float = 1.0) -> tuple[Views
     return found, T_world_object
 
 
+@lru_cache(maxsize=1)
+def _all_round(name: str, n: int) -> tuple[Views, np.ndarray]:
+    return views(shape(name), n)
+
+
 def of_one_side(name: str, towards_deg: float, arc_deg: float, n: int = 48) -> Views:
-    """Return those of n views of a demonstration object that are from around one direction of its frame; its handle is at 0°."""
-    all_round, T_world_object = views(shape(name), n)
+    """Return those of n views of a demonstration object that are from around one direction of its frame; its handle is at 180°."""
+    all_round, T_world_object = _all_round(name, n)
     eyes = [frames.apply(frames.inverse(T_world_object), T[:3, 3]) for T in all_round.T_world_cameras]
     off = [(np.degrees(np.arctan2(y, x)) - towards_deg + 180) % 360 - 180 for x, y, _ in eyes]
     kept = np.flatnonzero(np.abs(off) <= arc_deg / 2)

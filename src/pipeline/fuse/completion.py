@@ -5,10 +5,14 @@ from scipy import ndimage
 
 HANDLE_M = 0.025  # what stands off the body and is narrower in a level is no part of its wall
 OFF_M = 0.006  # what was seen so far off the wall is a handle: so much around it stays
-LEAST_UNSEEN = 0.05  # of the cavity's edge, over all levels; with less, what is unseen stays solid
+# Of the cavity's edge, and of the outer one on its levels; with less, what is unseen stays solid. Of bowls 4 % of the outside are
+# seen from nowhere.
+LEAST_UNSEEN, LEAST_UNSEEN_OUTSIDE = 0.05, 0.1
 LEAST_EDGE = 12  # voxels of a level whose both sides were seen tell how thick the wall is there
+LEAST_PART = 60  # voxels: a handle's or a foot's skin; noise near the table leaves a few
 HALF = 0.5  # of a voxel: so much further than the last solid one's middle is the surface, in the mean
 _CROSS = ndimage.generate_binary_structure(2, 1)
+_LEVEL = _CROSS[..., None]
 
 
 def completed(
@@ -16,37 +20,43 @@ def completed(
 ) -> np.ndarray:
     """Return the signed distances (nx, ny, nz) in truncations, positive in the open, with walls in place of what is in shadow.
 
-    measured (nx, ny, nz): what some view saw. walled_in: the cavity. Level by level: unseen places that are deeper in the body than
+    measured (nx, ny, nz): what some view saw. walled_in: the cavity. Unseen places that are deeper in the body on their level than
     its wall is thick, and can be reached from the cavity, are open; then those that are further from the cavity than that, and can
     be reached from outside, also below the cavity's floor. Nothing that was seen changes.
     """
-    edge = ndimage.binary_dilation(walled_in, _CROSS[..., None]) & (value <= 0)
-    if np.count_nonzero(edge & ~measured) <= LEAST_UNSEEN * np.count_nonzero(edge):
+    inside = ndimage.binary_dilation(walled_in, _LEVEL) & (value <= 0)
+    outside = _outer_edge((value <= 0) | walled_in) & walled_in.any(axis=(0, 1))
+    shadow_inside = _unseen(inside, measured) > LEAST_UNSEEN
+    if not shadow_inside and _unseen(outside, measured) <= LEAST_UNSEEN_OUTSIDE:
         return value
-    value, truncation = value.copy(), truncation_m / voxel_m
+    value, room, truncation = value.copy(), walled_in.copy(), truncation_m / voxel_m
     levels = np.flatnonzero(walled_in.any(axis=(0, 1)))
-    for z in levels[::-1]:  # down to the floor, whose level tells what is in shadow below
-        level, seen, room = value[..., z], measured[..., z], walled_in[..., z]
-        beyond = _beyond_wall_inside(level, seen, room, voxel_m)
-        level = _opened(level, seen, beyond, room, truncation)
-        room = ndimage.binary_propagation(room, mask=level > 0)
-        beyond = _beyond_wall_outside(level, seen, room, voxel_m)
-        value[..., z] = _opened(level, seen, beyond, (level > 0) & ~room, truncation)
-    for z in range(levels[0]):
-        level, seen = value[..., z], measured[..., z]
-        foot = (level <= 0) & seen & (beyond > OFF_M / voxel_m)
-        if np.count_nonzero(foot) < LEAST_EDGE:  # what is wider than the wall above was not in its shadow
-            value[..., z] = _opened(level, seen, beyond, level > 0, truncation)
-    return value
+    for z in levels if shadow_inside else ():
+        beyond = _beyond_wall_inside(value[..., z], measured[..., z], room[..., z], voxel_m)
+        value[..., z] = _opened(value[..., z], measured[..., z], beyond, room[..., z], truncation)
+    room = ndimage.binary_propagation(room, _LEVEL, mask=(value > 0) & room.any(axis=(0, 1)))
+    beyond = _beyond_wall_outside(value, measured, room, levels, voxel_m)
+    return _opened(value, measured, beyond, (value > 0) & ~room, truncation)
+
+
+def _outer_edge(body: np.ndarray) -> np.ndarray:
+    """Return which places (nx, ny, nz) of the body are at its edge on their level."""
+    return body & ~ndimage.binary_erosion(body, _LEVEL)
+
+
+def _unseen(places: np.ndarray, measured: np.ndarray) -> float:
+    """Return which share of the places (nx, ny, nz) was not seen."""
+    return float(np.mean(~measured[places])) if places.any() else 0.0
 
 
 def _opened(
     value: np.ndarray, measured: np.ndarray, beyond: np.ndarray, start: np.ndarray, truncation: float
 ) -> np.ndarray:
-    """Return the values (nx, ny) of a level, open where nothing was seen beyond the wall (in voxels), on ways from the start."""
+    """Return the values of a level (nx, ny) or of all, open where nothing was seen beyond the wall (in voxels), on ways from the
+    start."""
     unseen = (value <= 0) & ~measured
     reached = ndimage.binary_propagation(start, mask=start | (unseen & (beyond > 0)))
-    opened = unseen & ndimage.binary_dilation(reached, _CROSS)
+    opened = unseen & ndimage.binary_dilation(reached)
     return np.where(opened, np.maximum(value, np.clip(beyond / truncation, -1.0, 1.0)), value)
 
 
@@ -62,17 +72,41 @@ def _beyond_wall_inside(
 
 
 def _beyond_wall_outside(
-    value: np.ndarray, measured: np.ndarray, room: np.ndarray, voxel_m: float
+    value: np.ndarray, measured: np.ndarray, room: np.ndarray, levels: np.ndarray, voxel_m: float
 ) -> np.ndarray:
-    """Return how much further from the cavity than its wall is thick the voxels (nx, ny) are, in voxels; handles stay."""
-    solid = value <= 0
+    """Return how much further from the cavity than its wall is thick the voxels (nx, ny, nz) are, in voxels; handles stay.
+
+    Below the cavity's levels that is what it is on the lowest, unless a foot that is wider was seen.
+    """
+    solid, off = value <= 0, OFF_M / voxel_m
     distance, inside = ndimage.distance_transform_edt(~room, return_indices=True)
-    body = _without_handles(solid | room, voxel_m)
-    edge = body & ~ndimage.binary_erosion(body, _CROSS) & measured
-    beyond = _beyond(distance, edge & _seen_at(solid & measured, inside))
-    handle = solid & measured & (beyond > OFF_M / voxel_m)
-    near = ndimage.distance_transform_edt(~handle) <= OFF_M / voxel_m if handle.any() else handle
-    return np.where(near, -np.inf, beyond)
+    both = measured & _seen_at(solid & measured, inside)
+    thick = np.full(len(levels), np.nan)
+    for i, z in enumerate(levels):
+        body = _without_handles(solid[..., z] | room[..., z], voxel_m)
+        edge = body & ~ndimage.binary_erosion(body, _CROSS) & both[..., z]
+        if np.count_nonzero(edge) >= LEAST_EDGE:
+            thick[i] = np.median(distance[..., z][edge])
+    known = np.isfinite(thick)
+    if not known.any():
+        return np.full(value.shape, -np.inf)
+    beyond = distance - np.interp(np.arange(value.shape[2]), levels[known], thick[known]) - HALF
+    lowest = levels[0]
+    beyond[..., :lowest] = beyond[..., lowest, None]
+    further = _large(solid & measured & (beyond > off))
+    stays = np.count_nonzero(further, axis=(0, 1)) >= LEAST_EDGE
+    stays[lowest : levels[-1] + 1] = False
+    stays[levels[-1] + 1 :] = True
+    near = ndimage.distance_transform_edt(~further) <= off if further.any() else further
+    return np.where(near | stays, -np.inf, beyond)
+
+
+def _large(places: np.ndarray) -> np.ndarray:
+    """Return the places (nx, ny, nz) that hang together in more than a speck of noise."""
+    labels, _ = ndimage.label(places, np.ones((3, 3, 3)))
+    large = np.bincount(labels.ravel()) >= LEAST_PART
+    large[0] = False
+    return large[labels]
 
 
 def _beyond(distance: np.ndarray, edge: np.ndarray) -> np.ndarray:
@@ -83,7 +117,7 @@ def _beyond(distance: np.ndarray, edge: np.ndarray) -> np.ndarray:
 
 
 def _seen_at(seen: np.ndarray, nearest: np.ndarray) -> np.ndarray:
-    """Return whether something was seen (nx, ny) at the nearest places (2, nx, ny)."""
+    """Return whether something was seen at the nearest places (2, nx, ny), or (3, nx, ny, nz)."""
     return ndimage.binary_dilation(seen, iterations=2)[tuple(nearest)]
 
 

@@ -12,7 +12,7 @@ from pipeline.fuse.layouts import Views
 from pipeline.fuse.planes import Planes, planes
 from pipeline.fuse.refinement import refined
 from pipeline.fuse.table import Placement
-from pipeline.fuse.walls import parted
+from pipeline.fuse.walls import evened, parted
 from pipeline.fuse.wrapping import Field
 
 BLOCK = 8  # voxels; the box is whole blocks: a margin, and what Open3D's grid in benchmarks/fusion.py takes
@@ -63,7 +63,8 @@ def fuse(views: Views, placement: Placement, voxel_m: float, truncation_m: float
     value -= np.float32(_excess_m(heights_m, voxel_m) / truncation_m)
     walled_in = enclosed(value > 0)
     wider = completed(value, measured, walled_in, voxel_m, truncation_m)
-    if wider is not value:
+    completing = wider is not value
+    if completing:
         value, walled_in = wider, enclosed(wider > 0)
     floor = _table_layers(voxel_m) - lowest[2]
     table_closed_m2 = float(walled_in[:, :, floor].sum()) * voxel_m**2
@@ -75,8 +76,11 @@ def fuse(views: Views, placement: Placement, voxel_m: float, truncation_m: float
     vertices[base, 2] = 0.0
     inner = touches(vertices, ~base, walled_in, lowest, voxel_m)
     vertices, weight = refined(vertices, triangles, base, _excess_m(vertices[:, 2], voxel_m), seen_by)
+    seen = (weight > LEAST_WEIGHT) & ~base
+    if completing:
+        vertices = evened(vertices, triangles, inner, ~inner & ~base, seen)
     vertices, thickened = parted(vertices, triangles, inner, ~inner & ~base)
-    return Surface(vertices, triangles, (weight > LEAST_WEIGHT) & ~base, inner, table_closed_m2, thickened)
+    return Surface(vertices, triangles, seen, inner, table_closed_m2, thickened)
 
 
 def _excess_m(heights_m: np.ndarray, voxel_m: float) -> np.ndarray:
