@@ -62,6 +62,14 @@ def test_what_was_seen_all_round_stays_as_it_is():
     assert completion.completed(value, everything, inside, VOXEL_M, TRUNCATION_M) is value
 
 
+def test_a_pocket_in_noise_is_no_cavity():
+    value, seen, pocket = -np.ones((60, 60, 8)), np.zeros((60, 60, 8), bool), np.zeros((60, 60, 8), bool)
+    value[..., 7], pocket[20:30, 20:30, 5:7] = 1.0, True
+    value[pocket] = 1.0
+    assert pocket.sum() * VOXEL_M**3 < completion.LEAST_M3
+    assert completion.completed(value, seen, pocket, VOXEL_M, TRUNCATION_M) is value
+
+
 def test_a_foot_wider_than_the_wall_above_it_is_not_in_its_shadow():
     """A goblet: one half is seen, the floor is at the third level, and the foot below is wider than the cup."""
     x, y = np.meshgrid(np.arange(100) - 49.5, np.arange(100) - 49.5, indexing="ij")

@@ -8,6 +8,7 @@ OFF_M = 0.006  # what was seen so far off the wall is a handle: so much around i
 # Of the cavity's edge, and of the outer one on its levels; with less, what is unseen stays solid. Of bowls 4 % of the outside are
 # seen from nowhere.
 LEAST_UNSEEN, LEAST_UNSEEN_OUTSIDE = 0.05, 0.1
+LEAST_M3 = 5e-6  # a cavity that keeps less is none, and tells nothing of a wall
 LEAST_EDGE = 12  # voxels of a level whose both sides were seen tell how thick the wall is there
 LEAST_PART = 60  # voxels: a handle's or a foot's skin; noise near the table leaves a few
 HALF = 0.5  # of a voxel: so much further than the last solid one's middle is the surface, in the mean
@@ -24,6 +25,8 @@ def completed(
     its wall is thick, and can be reached from the cavity, are open; then those that are further from the cavity than that, and can
     be reached from outside, also below the cavity's floor. Nothing that was seen changes.
     """
+    if np.count_nonzero(walled_in) * voxel_m**3 < LEAST_M3:
+        return value
     inside = ndimage.binary_dilation(walled_in, _LEVEL) & (value <= 0)
     outside = _outer_edge((value <= 0) | walled_in) & walled_in.any(axis=(0, 1))
     shadow_inside = _unseen(inside, measured) > LEAST_UNSEEN
