@@ -54,10 +54,10 @@ def test_a_handle_is_not_hollowed_where_the_wall_behind_it_was_not_seen():
 
 
 def test_what_was_seen_all_round_stays_as_it_is():
-    value = np.full((40, 40, 8), 1.0)
+    value = np.full((40, 40, 12), 1.0)
     r = np.hypot(*np.meshgrid(np.arange(40) - 19.5, np.arange(40) - 19.5, indexing="ij"))
     value[(r > 10) & (r < 14)] = -1.0
-    inside = np.repeat((r <= 10)[..., None], 8, axis=2)
+    inside = np.repeat((r <= 10)[..., None], 12, axis=2)
     everything = np.ones(value.shape, bool)
     assert completion.completed(value, everything, inside, VOXEL_M, TRUNCATION_M) is value
 
