@@ -15,6 +15,7 @@ from pipeline.fuse.wrapping import Mesh, wrapped
 from pipeline.geometry import frames
 from pipeline.geometry.cavity import cavity
 from pipeline.geometry.sampling import uniform_points
+from pipeline.geometry.surface import Surface
 
 LARGEST_M, SMALLEST_M = 2.0, 0.005
 LARGEST_UNTOLD_M = 0.6  # without `units`: a mesh of unit size is as likely one that was normalised
@@ -121,6 +122,8 @@ def _on_table(mesh: Any, dropped: DroppedMesh, rng: np.random.Generator) -> Plac
         return None
     aside = rng.spawn(1)[0]  # the points of a mesh without a table stay as they are
     sample, _ = uniform_points(*mending.arrays(mesh), TABLE_SAMPLES, aside)
+    if on_table:
+        sample = sample[standing.open_above(sample, Surface(*mending.arrays(mesh)), str(dropped.path), aside)]
     place = standing.found(sample, on_table, str(dropped.path), aside)
     if place is not None and on_table is None:
         raise PipelineError(
