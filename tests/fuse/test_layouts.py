@@ -8,6 +8,7 @@ import open3d as o3d
 import pytest
 import trimesh
 from fuse import scenes, writers
+from PIL import Image
 
 from pipeline.errors import PipelineError
 from pipeline.fuse import agreement, layouts
@@ -279,3 +280,13 @@ def test_images_of_another_format_are_shown(recorded, tmp_path):
         path.rename(path.with_suffix(".tif"))
     with pytest.raises(PipelineError, match=r"found 00000\.tif; export them again"):
         layouts.read(tmp_path)
+
+
+@pytest.mark.parametrize(("size", "used"), [((640, 480), True), ((1280, 720), False)])
+def test_colours_of_another_size_are_not_used_and_that_is_known(recorded, tmp_path, size, used):
+    writers.seven_scenes(tmp_path / "cup", recorded)
+    for pose in (tmp_path / "cup").glob("*.pose.txt"):
+        Image.new("RGB", size).save(pose.with_name(pose.name.replace("pose.txt", "color.png")))
+        pose.unlink()
+    views = layouts.read(tmp_path / "cup")
+    assert (len(views.colours) == len(recorded), views.colours_differ) == (used, not used)

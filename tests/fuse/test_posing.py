@@ -51,6 +51,14 @@ def test_what_a_view_shows_of_the_table_stands_it_upright():
     np.testing.assert_array_equal(posing._upright(level[:5]), np.eye(4))
 
 
+def test_views_that_do_not_fit_and_colours_that_do_not_lie_over_depth_are_told():
+    facts = {"poses": "registered", "poses_off_m": None, "table_spread_m": 0.001}
+    assert recorded.complaints(facts | {"views_left_out": [], "colours_differ": False}) == []
+    left_out, colours = recorded.complaints(facts | {"views_left_out": list("abcde"), "colours_differ": True})
+    assert left_out.startswith("a, b, c and 2 more: left out")
+    assert "another size than depth" in colours
+
+
 @pytest.mark.parametrize(("spread_m", "told"), [(0.0021, 0), (0.0033, 1)])
 def test_depth_too_noisy_for_walls_is_named(spread_m, told):
     found = recorded.complaints({"poses": "given", "poses_off_m": 0.0, "table_spread_m": spread_m})

@@ -97,6 +97,7 @@ def _views(folder: Path, layout: str, names: list[str], options: Options) -> Vie
         raw.refuse(
             options, folder / "scan.yaml", "views with poses", turntable_deg="their poses say how they turn"
         )
+    colours, colours_differ = ([], False) if poses else _colours(chosen, images)
     return Views(
         depths_m=[depth for depth, _ in images],
         T_world_cameras=poses,
@@ -104,9 +105,10 @@ def _views(folder: Path, layout: str, names: list[str], options: Options) -> Vie
         names=[str(frame.depth.relative_to(folder)) for frame in chosen],
         layout=layout,
         options=_for(options, kept, len(frames), folder),
-        colours=[] if poses else _colours(chosen, images),
+        colours=colours,
         depth_scale=chosen[0].depth_scale,
         n_found=len(frames),
+        colours_differ=colours_differ,
     )
 
 
@@ -124,12 +126,14 @@ def _for(options: Options, kept: np.ndarray, n: int, folder: Path) -> Options:
     return replace(options, turntable_deg=tuple(angles[i] for i in kept))
 
 
-def _colours(frames: list[Frame], images: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
-    """Return the colours when every view has one that lies over its depth; they serve to register views without poses."""
+def _colours(
+    frames: list[Frame], images: list[tuple[np.ndarray, np.ndarray]]
+) -> tuple[list[np.ndarray], bool]:
+    """Return the colours when every view has one that lies over its depth, and whether one does not."""
     found = []
     for frame, (depth, _) in zip(frames, images, strict=True):
         colour = files.intensity(frame.colour, depth.shape) if frame.colour else None
         if colour is None:
-            return []
+            return [], frame.colour is not None
         found.append(colour)
-    return found
+    return found, False

@@ -36,7 +36,7 @@ class Views:
 
     intrinsics (N, 3, 3). T_world_cameras: N poses (4, 4), or none where the folder has none. colours: for all views the
     intensity (H, W) from 0 to 1, or none. depth_scale: units of the images per metre. n_found: views in the folder, of
-    which these are evenly chosen.
+    which these are evenly chosen. colours_differ: there are colours that do not lie over the depths.
     """
 
     depths_m: list[np.ndarray]
@@ -48,6 +48,7 @@ class Views:
     colours: list[np.ndarray]
     depth_scale: float
     n_found: int
+    colours_differ: bool = False
 
 
 @dataclass(frozen=True)

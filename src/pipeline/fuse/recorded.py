@@ -51,12 +51,13 @@ class Located:
             "eyes_object_m": eyes,
             "poses": "registered" if self.registration else "refined" if self.is_refined else "given",
             "poses_off_m": self.poses_off_m,
+            "colours_differ": views.colours_differ,
             **self.registration,
         }
 
 
 def complaints(facts: dict[str, Any]) -> list[str]:
-    """Return a sentence when the given poses do not fit together well, and one when depth is too noisy for walls."""
+    """Return a sentence each: views that do not fit, colours that were not used, poses that are off, depth too noisy for walls."""
     told = []
     off_m, as_given = facts["poses_off_m"] or 0.0, facts["poses"] == "given"
     if off_m > posing.OFF_M:
@@ -66,11 +67,20 @@ def complaints(facts: dict[str, Any]) -> list[str]:
             f"the poses are off by {1e3 * off_m:.1f} mm, by the table in each view; they were {done}; "
             "calibrate the camera's pose better"
         )
-    by_poses, spread_m = told and as_given, facts["table_spread_m"]
+    by_poses, spread_m = off_m > posing.OFF_M and as_given, facts["table_spread_m"]
     if spread_m > NOISY_M and not by_poses:
         told.append(
             f"depth is noisy: points of the table spread by {1e3 * spread_m:.1f} mm, which tears thin walls; "
             "record from nearer, more views, or the mean of several images a view"
+        )
+    if left_out := facts.get("views_left_out"):
+        shown = ", ".join(left_out[:3]) + (f" and {len(left_out) - 3} more" if len(left_out) > 3 else "")
+        told.append(
+            f"{shown}: left out, as they do not fit the other views; correct their poses or remove them"
+        )
+    if facts.get("colours_differ"):
+        told.append(
+            "colours were not used to find poses, as their images are of another size than depth; align colour to depth"
         )
     return told
 
