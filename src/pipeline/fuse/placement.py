@@ -70,11 +70,13 @@ class Cluster:
         return f"one of {size} mm at pixel ({x / z:.0f}, {y / z:.0f}) of {views.names[0]}"
 
 
-def find(views: Views, name: str, rng: np.random.Generator) -> tuple[Plane, Placement]:
+def find(
+    views: Views, name: str, rng: np.random.Generator, raised_m: float | None = None
+) -> tuple[Plane, Placement]:
     """Find the table and the one object on it, near what the cameras look at; the rest is background.
 
-    The table is the plane of most points on which something stands. A `PipelineError` says what is missing, or shows
-    both objects when there are two.
+    The table is the plane of most points on which something stands; raised_m: how much higher the object stands, where that is
+    known. A `PipelineError` says what is missing, or shows both objects when there are two.
     """
     points, middle = table.world_points(views), table.focus(views)
     x, y, z = (points.places_m - middle).T
@@ -85,7 +87,7 @@ def find(views: Views, name: str, rng: np.random.Generator) -> tuple[Plane, Plac
     for plane in table.planes(near.places_m, eyes, name, rng):
         try:
             first = place(some, _above(near, plane, views), plane, middle, views, name)
-            plane = _under(some, plane, first, eyes)
+            plane = _under(some, plane, first, eyes) if raised_m is None else plane.raised(raised_m)
             return plane, place(some, _above(near, plane, views), plane, middle, views, name)
         except NoObject as failure:
             failures.append(failure)
@@ -174,7 +176,8 @@ def _platter_m(placement: Placement, least: int) -> float | None:
         return None
     if np.mean(flat[border]) < FLAT_SHARE or np.count_nonzero(z > height + ABOVE_M) < least:
         return None
-    around = usual[held & (top > 0) & ~ndimage.binary_dilation(above, iterations=2)]
+    off_its_side = ndimage.binary_erosion(held, iterations=2) & (top > 0)
+    around = usual[off_its_side & ~ndimage.binary_dilation(above)]
     low, middle, high = np.quantile(around, [0.1, 0.5, 0.9]) if len(around) else (0.0, 0.0, 0.0)
     if high - low > FLAT_M or abs(middle - height) > FLAT_M:
         return None
@@ -193,7 +196,7 @@ def _under(points_m: np.ndarray, plane: Plane, placement: Placement, eyes: np.nd
     else:
         near_table = np.flatnonzero(placement.beside(x, y, AROUND_M))
         raised_m, near = _board(x, y, z, placement) or (0.0, near_table)
-    plane = Plane(plane.normal, plane.offset_m - raised_m, plane.rms_m)
+    plane = plane.raised(raised_m)
     if len(near) < LEAST_POINTS:
         return plane
     return table.refined(points_m[near], plane.normal, plane.offset_m, eyes)
