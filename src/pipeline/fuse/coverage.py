@@ -17,8 +17,8 @@ GUESSED = 0.3  # of the inner wall or of the floor: with less of it seen the cap
 STEP_M, LOW_SHARE, LEVEL_COSINE, ROUND_SHARE = (0.0015, 0.025), 0.5, 0.9, 0.6
 FLOATS_M = 0.005  # above the table: what a foot's shadow and noise leave open is less
 NO_INSIDE = (
-    "its inside was poorly seen: no inside that is open upwards was found; it is dark or shiny, no view looked in, or the object has "
-    "a lid, lies on its side or stands upside down; stand it upright and open, and look from above 60°"
+    "its inside was poorly seen: no inside that is open upwards was found; it is dark or shiny, no view looked in, or the object "
+    "has a lid, lies on its side or stands upside down; stand it upright and open, and look from above 60°"
 )
 BLIND = (
     "its capacity is a guess, as too little of its inside was seen; look from above 60°, make it matt where it is dark, shiny or "
