@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 import trimesh
 from fuse import writers
+from fuse.conftest import OPTIONS
 
 from pipeline.errors import PipelineError
-from pipeline.fuse import layouts, placement, posing, recorded
+from pipeline.fuse import layouts, levelled, placement, posing, recorded, registration
+from pipeline.fuse.fusion import fused
 from pipeline.geometry import frames
 from pipeline.scan import camera, recording
 from pipeline.scan.shapes import shape
@@ -23,6 +25,12 @@ def box(x: float, y: float, size=(0.06, 0.06, 0.08), bottom: float = recording.T
     return body.vertices + [x, y, bottom + size[2] / 2], body.faces
 
 
+def disc(diameter_m: float, thick_m: float, bottom: float = recording.TABLE_HEIGHT_M):
+    """Return a round board under the cup."""
+    body = trimesh.creation.cylinder(diameter_m / 2, thick_m, sections=64)
+    return body.vertices + [0.02, -0.03, bottom + thick_m / 2], body.faces
+
+
 ROOM = [
     box(0.0, 0.9, (4.0, 0.1, 3.0), 0.0),
     box(-0.9, 0.0, (0.1, 4.0, 3.0), 0.0),
@@ -30,9 +38,9 @@ ROOM = [
 ]
 
 
-def found(folder, *others, hide=None, held=(), table: bool = True, n: int = 12):
+def found(folder, *others, hide=None, held=(), table: bool = True, n: int = 12, body=CUP):
     """Record the cup and others on the table, `held` in every second view; return the table and the placement that fuse finds."""
-    cup = frames.apply(T_WORLD_OBJECT, CUP.vertices_m), CUP.triangles
+    cup = frames.apply(T_WORLD_OBJECT, body.vertices_m), body.triangles
     scene = camera.Scene([cup, *([recording.table()] if table else []), *others])
     other_scene = camera.Scene([cup, recording.table(), *others, *held]) if held else scene
     target = T_WORLD_OBJECT[:3, 3] + [0, 0, 0.03]
@@ -45,7 +53,7 @@ def found(folder, *others, hide=None, held=(), table: bool = True, n: int = 12):
     return placement.find(layouts.read(folder), str(folder), np.random.default_rng(3))
 
 
-def check_cup(place) -> None:
+def check_cup(place, body=CUP) -> None:
     """The bounds are the cup's, with the margin, on the table."""
     T = place.T_object_world @ T_WORLD_OBJECT
     assert abs(T[2, 3]) < 0.0005
@@ -55,7 +63,7 @@ def check_cup(place) -> None:
         2 * placement.MARGIN_M,
         placement.MARGIN_M,
     ]
-    np.testing.assert_allclose(size, np.ptp(CUP.vertices_m, axis=0), atol=0.006)
+    np.testing.assert_allclose(size, np.ptp(body.vertices_m, axis=0), atol=0.006)
 
 
 def test_clutter_further_away_and_the_room_behind_are_cut_away(tmp_path):
@@ -132,6 +140,20 @@ def test_an_object_on_a_turntable_stands_on_it(tmp_path):
     check_cup(place)
 
 
+def test_views_without_poses_stand_on_the_turntable_that_most_of_them_show(tmp_path):
+    """Those at 12° do not show its top: it was part of the object in them, which became 9 mm too tall. Steep ones show little but
+    the object's rim, and tell it from the turntable."""
+    lower = box(0.0, 0.0, (0.8, 0.8, 0.02), recording.TABLE_HEIGHT_M - 0.05)
+    found(tmp_path, disc(0.16, 0.03, recording.TABLE_HEIGHT_M - 0.03), lower, table=False, n=10)
+    views = layouts.read(tmp_path)
+    steep = levelled.level(views, 7, str(tmp_path), np.random.default_rng(2))
+    assert np.ptp(steep.points_m[:, :2], axis=0).max() < 0.065
+    stood, left_out = registration.levelled_all(views, str(tmp_path), np.random.default_rng(2))
+    assert len(left_out) <= 1
+    assert max(np.ptp(view.points_m[:, :2], axis=0).max() for view in stood) < 0.065
+    assert max(view.points_m[:, 2].max() for view in stood) < 0.065
+
+
 @pytest.mark.parametrize("width_m", [0.2, 0.09])
 def test_an_object_on_a_board_of_markers_stands_on_it(tmp_path, width_m):
     """A board of 5 mm is lower than what counts as an object, and is none of it; beside a narrow one more of the table is seen."""
@@ -144,6 +166,41 @@ def test_an_object_on_a_board_of_markers_stands_on_it(tmp_path, width_m):
     assert posing.off_m(views, place) < posing.OFF_M
     on_board = recorded.Located(views, plane, place, [], {})
     assert on_board.spread_m < 0.0015
+
+
+@pytest.mark.parametrize(
+    ("name", "board"),
+    [
+        ("small_cup", box(0.02, -0.03, (0.085, 0.085, 0.006), recording.TABLE_HEIGHT_M - 0.006)),
+        ("wide_bowl", disc(0.19, 0.01, recording.TABLE_HEIGHT_M - 0.01)),
+        ("small_cup", disc(0.16, 0.03, recording.TABLE_HEIGHT_M - 0.03)),
+    ],
+)
+def test_an_object_on_a_board_that_is_little_wider_stands_on_it(tmp_path, name, board):
+    """They were part of the object: one that is lower than an object is, one of less than twice its area, one whose side shows."""
+    lower = box(0.0, 0.0, (0.9, 0.9, 0.02), recording.TABLE_HEIGHT_M - np.ptp(board[0][:, 2]) - 0.02)
+    plane, place = found(tmp_path, board, lower, table=False, body=shape(name))
+    assert plane.offset_m == pytest.approx(-recording.TABLE_HEIGHT_M, abs=0.0007)
+    check_cup(place, shape(name))
+
+
+def test_a_board_as_wide_as_the_object_is_fused_with_it_and_told(tmp_path):
+    coaster = disc(0.068, 0.01, recording.TABLE_HEIGHT_M - 0.01)
+    lower = box(0.0, 0.0, (0.9, 0.9, 0.02), recording.TABLE_HEIGHT_M - 0.03)
+    found(tmp_path, coaster, lower, table=False, n=8)
+    told = fused(tmp_path, **OPTIONS).complaints
+    assert any("something level, 10 mm above the table" in sentence for sentence in told), told
+
+
+def test_a_saucer_under_the_cup_is_no_table(tmp_path):
+    """It rises to its rim, at whose height the cup was cut off."""
+    profile_m = [[0, 0], [0.03, 0], [0.032, 0.003], [0.07, 0.016], [0.07, 0.018], [0.03, 0.006], [0, 0.005]]
+    saucer = trimesh.creation.revolve(np.array(profile_m), sections=64)
+    placed = saucer.vertices + [0.02, -0.03, recording.TABLE_HEIGHT_M - 0.005], saucer.faces
+    lower = box(0.0, 0.0, (0.9, 0.9, 0.02), recording.TABLE_HEIGHT_M - 0.025)
+    plane, place = found(tmp_path, placed, lower, table=False, n=8)
+    assert plane.offset_m == pytest.approx(0.005 - recording.TABLE_HEIGHT_M, abs=0.0007)
+    assert np.ptp(place.bounds_m, axis=0)[0] == pytest.approx(0.14 + 2 * placement.MARGIN_M, abs=0.006)
 
 
 def test_a_book_beside_the_object_does_not_carry_it(tmp_path):

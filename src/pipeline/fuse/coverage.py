@@ -13,6 +13,8 @@ FLOOR_COSINE = 0.7  # what faces up within 45° is floor
 MUCH_THICKENED = 0.01  # of the outside: is named
 POOR = 0.8  # a part of which less was seen is named
 GUESSED = 0.3  # of the inner wall or of the floor: with less of it seen the capacity is a guess
+# A step round the foot: so low, faces up within 25°, on so much of the way round.
+STEP_M, LOW_SHARE, LEVEL_COSINE, ROUND_SHARE = (0.0015, 0.025), 0.5, 0.9, 0.6
 FLOATS_M = 0.005  # above the table: what a foot's shadow and noise leave open is less
 NO_INSIDE = (
     "its inside was poorly seen: no inside that is open upwards was found; it is dark or shiny, no view looked in, or the object "
@@ -54,10 +56,23 @@ def shares_seen(surface: Surface) -> dict[str, float | None]:
     return shares
 
 
+def step_m(surface: Surface) -> float | None:
+    """Return the height above the table of what is level all round the foot, as a board or a saucer under it is; or None."""
+    x, y, z = surface.vertices_m.T
+    low = (z > STEP_M[0]) & (z < min(STEP_M[1], LOW_SHARE * z.max())) & ~surface.inner
+    level = low & (vertex_normals(surface.vertices_m, surface.triangles, 1)[:, 2] > LEVEL_COSINE)
+    directions = np.unique(np.floor(np.degrees(np.arctan2(y[level], x[level])) / 5))
+    return float(np.median(z[level])) if len(directions) > ROUND_SHARE * 72 else None
+
+
 def complaints(
-    shares: dict[str, float | None], thickened_share: float = 0.0, lowest_m: float = 0.0
+    shares: dict[str, float | None],
+    thickened_share: float = 0.0,
+    lowest_m: float = 0.0,
+    stepped_m: float | None = None,
 ) -> list[str]:
-    """Return a sentence for each part that was poorly seen or not at all, a wall that was thickened, a foot that is missing."""
+    """Return a sentence for each part that was poorly seen or not at all, a wall that was thickened, a foot that is missing, and a
+    step round the foot."""
     inside = [shares.get("inner_wall"), shares.get("floor")]
     told = [NO_INSIDE] if shares and inside == [None, None] else _poor(shares)
     if any(share is not None and share < GUESSED for share in inside):
@@ -71,6 +86,11 @@ def complaints(
         told.append(
             f"nothing of it was seen between the table and {lowest_m * 1e3:.0f} mm above: its foot is clear, dark or shiny, or it "
             "stands on something that is; heights are counted from the table"
+        )
+    if stepped_m is not None:
+        told.append(
+            f"something level, {stepped_m * 1e3:.0f} mm above the table, is all round its foot and was fused with it: "
+            "if that is a board, a coaster or a saucer, take it away"
         )
     return told
 

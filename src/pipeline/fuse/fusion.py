@@ -71,7 +71,9 @@ def fused(
         "wall_thickened_share": surface.thickened_share,
     }
     lowest_m = float(surface.vertices_m[:, 2].min())
-    told = recorded.complaints(facts) + coverage.complaints(shares, surface.thickened_share, lowest_m)
+    told = recorded.complaints(facts) + coverage.complaints(
+        shares, surface.thickened_share, lowest_m, coverage.step_m(surface)
+    )
     return replace(_result(surface, n_points, True, rng, facts), complaints=tuple(told))
 
 

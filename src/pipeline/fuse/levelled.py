@@ -14,6 +14,8 @@ from pipeline.geometry import frames
 
 VOXEL_M, NORMAL_RADIUS_M = 0.002, 0.006
 LEAST_POINTS = 150
+# What the object stands on is no higher than this above the table that is seen so far around it.
+HIGHEST_M, AROUND_M, SAME_M = 0.1, 0.4, 0.004
 # A difference of normals of one, or of contrasts of one, weighs as much as this distance.
 NORMAL_M, COLOUR_M = 0.006, 0.030
 # Contrast is intensity less its mean over so many metres: light that stays with the camera of a turntable is no paint.
@@ -53,8 +55,13 @@ class Levelled:
         )
 
 
-def level(views: Views, i: int, name: str, rng: np.random.Generator) -> Levelled:
-    """Stand view i upright; a `PipelineError` says that it has no table or no object on it."""
+def level(
+    views: Views, i: int, name: str, rng: np.random.Generator, raised_m: float | None = None
+) -> Levelled:
+    """Stand view i upright; a `PipelineError` says that it has no table or no object on it.
+
+    raised_m: how much higher than the table the object stands, where other views tell.
+    """
     single = replace(
         views,
         depths_m=[views.depths_m[i]],
@@ -62,7 +69,7 @@ def level(views: Views, i: int, name: str, rng: np.random.Generator) -> Levelled
         intrinsics=views.intrinsics[i : i + 1],
         names=[views.names[i]],
     )
-    _, place = placement.find(single, f"{name}, {views.names[i]}", rng)
+    _, place = placement.find(single, f"{name}, {views.names[i]}", rng, raised_m)
     found = shown(views, i, place, name)
     shift = frames.transform(np.eye(3), np.array([*-axis_of(found.points_m, found.normals), 0.0]))
     return replace(
@@ -79,6 +86,17 @@ def shown(views: Views, i: int, place: Placement, name: str) -> Levelled:
         )
     points, normals, contrast = _even(points, contrast, place.T_object_world[:3, 3])
     return Levelled(i, points, normals, contrast, place.T_object_world, contrasts)
+
+
+def raised_m(views: Views, view: Levelled) -> float:
+    """Return by how much the view's object stands higher than the plane of most points around it: 0, or a turntable's height."""
+    i = view.number
+    depth = views.depths_m[i][::4, ::4]
+    v, u = np.nonzero(depth)
+    x, y, z = frames.apply(view.T_level_camera, unprojected(4 * u, 4 * v, depth[v, u], views.intrinsics[i])).T
+    z = z[(np.hypot(x, y) < AROUND_M) & (np.abs(z) < HIGHEST_M)]
+    counts, edges = np.histogram(z, np.arange(-HIGHEST_M, SAME_M, SAME_M))
+    return max(0.0, -float(np.median(z[np.abs(z - edges[counts.argmax()] - SAME_M / 2) < SAME_M])))
 
 
 def _points(views: Views, i: int, place: Placement) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:

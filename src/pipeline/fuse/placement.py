@@ -23,10 +23,12 @@ MOST_BELOW = 0.05  # of the points over the footprint may lie more than `BELOW_M
 BELOW_M = 0.010
 LEAST_POINTS = 300
 LEAST_OF_A_VIEW = 60
+LEAST_RAISED = 30  # above the base, in a single view: a steep one shows little but the rim there
 # A second object: this far from the first at most, with this share of its points, in this share of the views.
 SECOND_M, SECOND_POINTS, SECOND_VIEWS = 0.15, 0.15, 0.5
-# A base under the object: its border is flat, it is so many times larger than what stands on it.
+# A base under the object: flat, its border too, and so many times larger than what stands on it, or no higher than a thick board.
 FLAT_M, FLAT_SHARE, BASE_AREAS = 0.004, 0.7, 2.0
+THICK_M, ALL_FLAT_SHARE = 0.025, 0.9
 LEAST_STANDING = 0.25  # of the base's height: what is lower is a lid's knob, and no object
 OTHERS = 12  # views that are asked whether they look through a point
 # What is nearer together is one thing; in a single view its own shadow lies between its parts.
@@ -34,7 +36,7 @@ GAP_M, SHADOW_M = 0.016, 0.12
 AROUND_M = 0.15  # the table is fitted again this far around the object: depth cameras bend large planes
 # A board under the object: between these heights above the table (a higher one is a platter), on so much of the table this far
 # around the object, and in directions from it that leave no larger gap.
-BESIDE_M, LEAST_BOARD_M, MOST_BOARD_M, BOARD_SHARE, MOST_OPEN_RAD = 0.03, 0.002, 0.012, 0.2, 0.75 * np.pi
+BESIDE_M, LEAST_BOARD_M, MOST_BOARD_M, BOARD_SHARE, MOST_OPEN_RAD = 0.03, 0.002, 0.012, 0.1, 0.75 * np.pi
 _ASKED = 300_000  # points at most tell heights, noise, and what is below the table: every so many
 _COMPARED = 5_000  # points of each of two objects
 _HITS_OF_NOISE = 3  # stray pixels hit a cell once or twice; a cell of the object is hit by many views
@@ -68,11 +70,13 @@ class Cluster:
         return f"one of {size} mm at pixel ({x / z:.0f}, {y / z:.0f}) of {views.names[0]}"
 
 
-def find(views: Views, name: str, rng: np.random.Generator) -> tuple[Plane, Placement]:
+def find(
+    views: Views, name: str, rng: np.random.Generator, raised_m: float | None = None
+) -> tuple[Plane, Placement]:
     """Find the table and the one object on it, near what the cameras look at; the rest is background.
 
-    The table is the plane of most points on which something stands. A `PipelineError` says what is missing, or shows
-    both objects when there are two.
+    The table is the plane of most points on which something stands; raised_m: how much higher the object stands, where that is
+    known. A `PipelineError` says what is missing, or shows both objects when there are two.
     """
     points, middle = table.world_points(views), table.focus(views)
     x, y, z = (points.places_m - middle).T
@@ -83,7 +87,7 @@ def find(views: Views, name: str, rng: np.random.Generator) -> tuple[Plane, Plac
     for plane in table.planes(near.places_m, eyes, name, rng):
         try:
             first = place(some, _above(near, plane, views), plane, middle, views, name)
-            plane = _under(some, plane, first, eyes)
+            plane = _under(some, plane, first, eyes) if raised_m is None else plane.raised(raised_m)
             return plane, place(some, _above(near, plane, views), plane, middle, views, name)
         except NoObject as failure:
             failures.append(failure)
@@ -151,25 +155,34 @@ def place(
     return placement
 
 
-def _platter_m(placement: Placement) -> float | None:
-    """Return the height of a flat base that the object stands on, such as a turntable's, or None.
+def _platter_m(placement: Placement, least: int) -> float | None:
+    """Return the height of a flat base that the object, of so many points at least, stands on, such as a turntable's, or None.
 
-    A base is flat all along its border, and much larger than what stands on it.
+    A base is flat from its border to what stands on it, as no saucer is, and much larger than that, or as low as a board.
     """
     z = placement.points_m[:, 2]
-    cells = tuple(np.floor((placement.points_m[:, :2] - placement.bounds_m[0, :2]) / CELL_M).astype(int).T)
-    top = np.zeros(placement.footprint.shape)
-    np.maximum.at(top, cells, z)
+    shape = placement.footprint.shape
+    column = np.floor((placement.points_m[:, :2] - placement.bounds_m[0, :2]) / CELL_M).astype(int)
+    cell = np.ravel_multi_index(tuple(column.T), shape)
+    every = np.arange(placement.footprint.size)
+    top = np.maximum(ndimage.maximum(z, cell, every), 0.0).reshape(shape)
+    usual = np.asarray(ndimage.median(z, cell, every)).reshape(shape)
     held = ndimage.binary_fill_holes(ndimage.binary_closing(top > 0))
     border = held & ~ndimage.binary_erosion(held, iterations=3) & (top > 0)
     height = float(np.median(top[border]))
     flat = np.abs(top - height) < FLAT_M
-    above = top > height + ABOVE_M
+    above = ndimage.binary_fill_holes(top > height + ABOVE_M)
     if np.sort(z)[-10] - height < LEAST_STANDING * height:
         return None
-    if np.mean(flat[border]) < FLAT_SHARE or np.count_nonzero(z > height + ABOVE_M) < LEAST_POINTS:
+    if np.mean(flat[border]) < FLAT_SHARE or np.count_nonzero(z > height + ABOVE_M) < least:
         return None
-    if np.count_nonzero(held) < BASE_AREAS * np.count_nonzero(ndimage.binary_fill_holes(above)):
+    off_its_side = ndimage.binary_erosion(held, iterations=2) & (top > 0)
+    around = usual[off_its_side & ~ndimage.binary_dilation(above)]
+    low, middle, high = np.quantile(around, [0.1, 0.5, 0.9]) if len(around) else (0.0, 0.0, 0.0)
+    if high - low > FLAT_M or abs(middle - height) > FLAT_M:
+        return None
+    is_board = height < THICK_M and np.mean(flat[border]) > ALL_FLAT_SHARE
+    if not is_board and np.count_nonzero(held) < BASE_AREAS * np.count_nonzero(above):
         return None
     return float(np.median(z[np.abs(z - height) < FLAT_M]))
 
@@ -177,13 +190,13 @@ def _platter_m(placement: Placement) -> float | None:
 def _under(points_m: np.ndarray, plane: Plane, placement: Placement, eyes: np.ndarray) -> Plane:
     """Return what the object stands on, fitted to the points near it: a platter, a board, or the table, which is not quite flat."""
     x, y, z = frames.apply(placement.T_object_world, points_m).T
-    raised_m = _platter_m(placement)
+    raised_m = _platter_m(placement, LEAST_POINTS if len(eyes) > 1 else LEAST_RAISED)
     if raised_m is not None:
         near = np.flatnonzero(placement.covers(x, y))
     else:
         near_table = np.flatnonzero(placement.beside(x, y, AROUND_M))
         raised_m, near = _board(x, y, z, placement) or (0.0, near_table)
-    plane = Plane(plane.normal, plane.offset_m - raised_m, plane.rms_m)
+    plane = plane.raised(raised_m)
     if len(near) < LEAST_POINTS:
         return plane
     return table.refined(points_m[near], plane.normal, plane.offset_m, eyes)
@@ -206,7 +219,7 @@ def _board(
     top_m = float(np.median(height_m[raised]))
     on_top = np.abs(height_m - top_m) < FLAT_M / 2
     board = beside[on_top]
-    far = board[~placement.beside(x_m[board], y_m[board], BESIDE_M / 2)]
+    far = board[~placement.beside(x_m[board], y_m[board], 0.0)]
     if np.count_nonzero(on_top) < FLAT_SHARE * np.count_nonzero(raised) or not len(far):
         return None
     angle = np.sort(np.arctan2(y_m[far], x_m[far]))

@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.errors import PipelineError
 from pipeline.fuse import placement, tsdf, turning
 from pipeline.fuse.evidence import unlike_by_chance
-from pipeline.fuse.levelled import Levelled, axis_of, level
+from pipeline.fuse.levelled import Levelled, axis_of, level, raised_m
 from pipeline.fuse.raw import Views
 from pipeline.fuse.smoothing import vertex_normals
 from pipeline.fuse.table import Placement
@@ -23,6 +23,7 @@ GOLDEN = 0.381966  # of a whole turn
 LEAST_VIEWS = 6
 VOXEL_M, ROUNDS = 0.002, 3  # of the fit to the fused surface
 MOST_LEFT_OUT = 0.2
+LEAST_RAISED_M = 0.006  # lower than this is a board that each view may or may not show
 # Of the points of round objects 0.3 % are further than that from their surface, of bowls with beads on the rim as well; 2.5 % where
 # it lacks a handle of 14 mm.
 BEYOND_M, MOST_BEYOND = 0.005, 0.01
@@ -42,7 +43,7 @@ def registered(views: Views, name: str, rng: np.random.Generator) -> tuple[Views
             f"{name}: expected at least {LEAST_VIEWS} views where there are no poses, found {len(views.depths_m)}; record more, or "
             "add their poses"
         )
-    stood, left_out = _levelled(views, name, rng)
+    stood, left_out = levelled_all(views, name, rng)
     if views.colours and not _is_painted(stood):
         views, stood = replace(views, colours=[]), [_without_colours(view) for view in stood]
     poses, told = turning.placed(stood, views, rng)
@@ -104,7 +105,7 @@ def _all_round(stood: list[Levelled], poses: list[np.ndarray]) -> list[np.ndarra
     return [turn @ T for turn, T in zip(turns, poses, strict=True)]
 
 
-def _levelled(views: Views, name: str, rng: np.random.Generator) -> tuple[list[Levelled], list[str]]:
+def levelled_all(views: Views, name: str, rng: np.random.Generator) -> tuple[list[Levelled], list[str]]:
     """Return the views that show table and object; those that see a handle or a corner first, as they tell turns apart."""
     stood, failures = [], {}
     for i in range(len(views.depths_m)):
@@ -112,12 +113,38 @@ def _levelled(views: Views, name: str, rng: np.random.Generator) -> tuple[list[L
             stood.append(level(views, i, name, rng))
         except PipelineError as failure:
             failures[views.names[i]] = failure
+    stood = _as_high(stood, failures, views, name, rng)
     if len(failures) > MOST_LEFT_OUT * len(views.depths_m):
         raise next(iter(failures.values()))
     check_alike(stood, views.names, name)
     return sorted(
         stood, key=lambda view: (-round(view.lopsided_m / 0.005), abs(view.steepness - FIRST_STEEPNESS))
     ), list(failures)
+
+
+def _as_high(
+    stood: list[Levelled],
+    failures: dict[str, PipelineError],
+    views: Views,
+    name: str,
+    rng: np.random.Generator,
+) -> list[Levelled]:
+    """Return the views with the object as high above the table as in most: grazing ones do not show a turntable's top.
+
+    Those that then show no object join the failures.
+    """
+    heights_m = np.array([raised_m(views, view) for view in stood])
+    usual_m = float(np.median(heights_m)) if len(stood) else 0.0
+    if usual_m < LEAST_RAISED_M:
+        return stood
+    alike = []
+    for view, height_m in zip(stood, heights_m, strict=True):
+        try:
+            is_low = height_m < usual_m / 2
+            alike.append(level(views, view.number, name, rng, usual_m) if is_low else view)
+        except PipelineError as failure:
+            failures[views.names[view.number]] = failure
+    return alike
 
 
 def check_alike(stood: list[Levelled], names: list[str], name: str) -> None:

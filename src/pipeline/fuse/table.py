@@ -34,6 +34,10 @@ class Plane:
         """Return the height (N,) of points (N, 3) above the table."""
         return points_world @ self.normal + self.offset_m
 
+    def raised(self, by_m: float) -> "Plane":
+        """Return the plane that is so much higher."""
+        return Plane(self.normal, self.offset_m - by_m, self.rms_m)
+
 
 @dataclass(frozen=True)
 class Placement:
