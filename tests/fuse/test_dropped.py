@@ -281,3 +281,42 @@ def test_a_floor_made_for_itself_is_no_liquid(tmp_path):
     result = dropped(tmp_path / "mug", tube, turned((0, 0), (37.5, 0), (37.5, 4), (0, 4)))
     assert result.complaints == ()
     assert capacity_ml(result) == pytest.approx(np.pi * 37**2 * 86 / 1e3, rel=0.01)
+
+
+@pytest.mark.parametrize("top", [(30, 61.5), (15, 62)])  # a meniscus's edge, foam's middle
+def test_liquid_whose_top_is_not_flat_is_told(tmp_path, top):
+    meniscus = [(37.5, 63), (33, 61), (25, 60), (0, 60)] if top == (30, 61.5) else [(37.5, 60), top, (0, 64)]
+    result = dropped(tmp_path / "mug", thin_cup(40, 90, 3), turned((0, 2), (37.5, 2), *meniscus))
+    (told,) = result.complaints
+    assert re.search(r"without it 37\d ml go in instead of 1[12]\d: if it is liquid, remove it", told)
+
+
+def test_a_spoon_in_a_cup_is_named(tmp_path):
+    spoon = turned((0, -5), (4, -5), (4, 130), (0, 130)).apply_translation([0, 0, 0.006])
+    with pytest.raises(
+        PipelineError,
+        match=r"alone, found something 135 mm wide in it or over its opening at \(0, 0, 69\) mm .*; remove it where",
+    ):
+        dropped(tmp_path / "mug", thin_cup(40, 90, 3), spoon)
+
+
+def test_a_lid_is_named(tmp_path):
+    lid = turned((0, 0), (40, 0), (40, 3), (0, 3)).apply_translation([0, 0, 0.0895])
+    with pytest.raises(
+        PipelineError,
+        match=r"80 mm wide in it or over its opening at \(-?0, -?0, 91\) mm .*; remove it where",
+    ):
+        dropped(tmp_path / "mug", thin_cup(40, 90, 3), lid)
+
+
+def test_a_sheet_on_the_wall_is_no_hole(tmp_path):
+    picture = turned((20.1, 12), (20.1, 24))
+    result = dropped(tmp_path / "mug", thin_cup(20, 30, 3), picture)
+    assert capacity_ml(result) == pytest.approx(np.pi * 17**2 * 27 / 1e3, rel=0.01)
+
+
+def test_a_wide_hole_beside_a_sheet_on_the_wall_is_one(tmp_path):
+    cup, picture = thin_cup(30, 40, 3), turned((30.1, 12), (30.1, 30))
+    cup.update_faces((cup.triangles_center[:, 0] < 0.029) | (cup.triangles_center[:, 2] < 0.02))
+    with pytest.raises(PipelineError, match="expected a closed surface, found a hole"):
+        dropped(tmp_path / "mug", cup, picture)

@@ -143,3 +143,11 @@ def test_what_a_tilted_cylinder_keeps(cup: Cavity) -> None:
     assert float(retained_volume_m3(cup, lip, axis, 0.0)) == pytest.approx(cup.capacity_m3, rel=0.005)
     assert float(retained_volume_m3(cup, lip, axis, np.pi * 2 / 3)) < 0.01 * cup.capacity_m3
     assert np.all(np.diff(retained_volume_m3(cup, lip, axis, np.linspace(0, 2, 50))) <= 0)
+
+
+@pytest.mark.parametrize(("floor_m", "height_m"), [(0.088, 0.09), (0.003, 0.005)])
+def test_a_tray_whose_room_is_level_with_its_rim_is_refused(floor_m, height_m):
+    rim = [(0.06, 0), (0.06, height_m), (0.057, height_m), (0.057, floor_m)]
+    tray = trimesh.creation.revolve([(0, 0), *rim, (0, floor_m)], sections=64)
+    with pytest.raises(PipelineError, match="tray: expected"):
+        cavity(tray.vertices, tray.faces, name="tray")

@@ -24,12 +24,22 @@ def without(mesh: Any) -> tuple[Any, int]:
 
 
 def beside(mesh: Any) -> np.ndarray | None:
-    """Return the corners (2, 3) of a wide thing that stands apart from the widest piece of a trimesh; None without one."""
+    """Return the corners (2, 3) of a wide thing that stands apart from the largest piece of a trimesh; None without one."""
     pieces, low, high = _pieces(mesh)
     width = np.linalg.norm(high - low, axis=1)
-    own = _with_near(mesh, pieces, np.arange(len(width)) == width.argmax(), APART * width.max())
+    body = np.bincount(pieces, mesh.area_faces).argmax()  # a spoon in a cup is wider
+    own = _with_near(mesh, pieces, np.arange(len(width)) == body, APART * width.max())
     other = int(np.where(own, 0.0, width).argmax())
     return None if own[other] or width[other] < SMALL * width.max() else np.stack([low[other], high[other]])
+
+
+def alone(file: str, other: np.ndarray, where: str, cure: str) -> str:
+    """Return the sentence that names another thing, by the corners (2, 3) of the box around it."""
+    x, y, z = (f"{v:.0f}" for v in 1000 * other.mean(axis=0))
+    return (
+        f"{file}: expected a container alone, found something {1000 * np.ptp(other, axis=0).max():.0f} mm wide {where} at "
+        f"({x}, {y}, {z}) mm of the upright object; {cure} where you made the file"
+    )
 
 
 def _pieces(mesh: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

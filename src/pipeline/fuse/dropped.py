@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.errors import PipelineError
-from pipeline.fuse import clouds, drains, mending, parts, raw, standing
+from pipeline.fuse import clouds, crumbs, drains, mending, parts, raw, standing
 from pipeline.fuse.layouts import CLOUDS
 from pipeline.fuse.raw import UPS, DroppedMesh
 from pipeline.fuse.table import Placement
@@ -60,7 +60,7 @@ def _from_mesh(
     _check_size(mesh.vertices, dropped, LARGEST_UNTOLD_M)
     emptied = _without_filling(mesh, options.wall_m, file)
     try:
-        whole, facts = mending.mended(mesh, options.wall_m, file, rng)
+        whole, facts = mending.mended(mesh, options.wall_m, file, rng, emptied is not None)
     except PipelineError as error:
         if emptied is None:
             raise
@@ -68,6 +68,8 @@ def _from_mesh(
             f"{file}: expected a container alone, found a level sheet in it, as of liquid, {1000 * emptied.level_m:.0f} mm above "
             "its base; remove it where you made the mesh"
         ) from error
+    if not mending.holds(whole):
+        _check_body_alone(mesh, options.wall_m, file)
     whole, done = _holding(whole, up, file)
     facts |= done | ({} if emptied is None else emptied.facts(whole))
     return whole, T_object_world, {"layout": "mesh", "n_views": 0, "mended": facts}
@@ -100,6 +102,20 @@ def _without_filling(mesh: Any, wall_m: float | None, file: str) -> _Emptied | N
     except PipelineError:
         return None
     return _Emptied(float(mesh.triangles[filling][..., 2].max()), capacity_m3)
+
+
+def _check_body_alone(mesh: Any, wall_m: float | None, file: str) -> None:
+    """Refuse an upright trimesh that holds nothing with its parts, as a spoon in it or a lid, and does without them."""
+    found = parts.body_and_highest(mesh)
+    if found is None:
+        return
+    body, other = found
+    try:
+        whole, _ = mending.mended(body, wall_m, file, np.random.default_rng(0))
+    except PipelineError:
+        return
+    if mending.holds(whole):
+        raise mending.Certain(crumbs.alone(file, other, "in it or over its opening", "remove it"))
 
 
 def complaints(facts: dict[str, Any]) -> list[str]:

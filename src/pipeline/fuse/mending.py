@@ -4,10 +4,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy import ndimage
 
 from pipeline.errors import PipelineError
 from pipeline.fuse import crumbs, parts
-from pipeline.fuse.wrapping import Mesh, thickness_m, wrapped
+from pipeline.fuse.wrapping import Field, Mesh, thickness_m, wrapped
 from pipeline.geometry import sampling
 from pipeline.geometry.cavity import cavity
 from pipeline.geometry.surface import Surface
@@ -15,6 +16,7 @@ from pipeline.geometry.surface import Surface
 MOST_TRIANGLES = 3_000_000
 BASE_SHARE = 0.06  # of the height: holes whose edge is lower are closed by the table
 LARGEST_HOLE = 0.15  # of the size: a wider hole would be a guess
+ENCLOSED = 0.99  # of the area is the solid's, or in it, where nothing was reached through a hole
 MOST_SHEET = 0.2  # of the area may be seen from both sides
 SEEN = 0.04  # of the directions from a point lead outside, where it counts as seen
 SAMPLES, DIRECTIONS = 1500, 48
@@ -37,11 +39,12 @@ class Certain(PipelineError):
 
 
 def mended(
-    mesh: Any, wall_m: float | None, file: str, rng: np.random.Generator
+    mesh: Any, wall_m: float | None, file: str, rng: np.random.Generator, is_filled: bool = False
 ) -> tuple[Mesh, dict[str, Any]]:
     """Return a trimesh (object frame, metres) as a closed mesh, oriented outwards, and what was done to it.
 
-    A `PipelineError` names the file when the surface has no thickness or a hole too large to guess what was there.
+    With `is_filled` no sheet is taken for one on the wall. A `PipelineError` names the file when the surface has no thickness
+    or a hole too large to guess what was there.
     """
     mesh = cleaned(mesh, file)
     facts: dict[str, Any] = {"components": int(mesh.body_count), "holes_closed": 0, "remeshed": False}
@@ -62,17 +65,22 @@ def mended(
         _check_alone(result, file)
         return result, facts | {"remeshed": True, "thickened_m": wall_m}
     found = holes(mesh)
-    _check(found, mesh, file)
-    if found:
-        mesh = _filled(mesh, found)
-        facts["holes_closed"] = len(found)
-    if sound(mesh):
+    wide = [hole for hole in found if _is_wide(hole, mesh)]
+    closed = [hole for hole in found if not _is_wide(hole, mesh)]
+    if closed:
+        mesh = _filled(mesh, closed)
+        facts["holes_closed"] = len(closed)
+    if wide and is_filled:
+        raise PipelineError(_wide_hole(wide[0], mesh, file))
+    if not wide and sound(mesh):
         return arrays(mesh), facts
-    whole = parts.united(mesh)
+    whole = None if wide else parts.united(mesh)
     if whole is not None:
         return whole, facts
     field = wrapped(*arrays(mesh))
     result = field.surface()
+    if wide:
+        _check_enclosed(wide[0], mesh, field, file)
     _check_kept(mesh, result, file)
     _check_alone(result, file)
     _check_thick(mesh, result, field.cell_m, file)
@@ -166,17 +174,28 @@ def holes(mesh: Any) -> list[Hole]:
     return sorted(found, key=lambda hole: -hole.width_m)
 
 
-def _check(found: list[Hole], mesh: Any, file: str) -> None:
+def _is_wide(hole: Hole, mesh: Any) -> bool:
+    """Return whether a hole is too wide to guess what was there."""
     low, high = np.asarray(mesh.bounds, float)
-    size = float((high - low).max())
-    for hole in found:
-        at_base = hole.high_m < low[2] + BASE_SHARE * (high[2] - low[2])
-        if hole.width_m > LARGEST_HOLE * size and not at_base:
-            x, y, z = (f"{v:.0f}" for v in 1000 * (hole.centre_m - [0, 0, low[2]]))
-            raise PipelineError(
-                f"{file}: expected a closed surface, found a hole {1000 * hole.width_m:.0f} mm wide at ({x}, {y}, {z}) mm "
-                "of the upright object; close it where you made the mesh"
-            )
+    at_base = hole.high_m < low[2] + BASE_SHARE * (high[2] - low[2])
+    return hole.width_m > LARGEST_HOLE * float((high - low).max()) and not at_base
+
+
+def _check_enclosed(hole: Hole, mesh: Any, field: Field, file: str) -> None:
+    """Refuse when the inside of the wall was reached through a hole; cracks and the edges of a sheet on the wall are none."""
+    points, _ = sampling.uniform_points(*arrays(mesh), SAMPLES, np.random.default_rng(0))
+    index = np.rint((points - field.low_m) / field.cell_m).astype(int)
+    at_solid = ndimage.binary_dilation(field.value_m > 0, iterations=2)[tuple(index.T)]
+    if at_solid.mean() < ENCLOSED or not holds(field.surface()):
+        raise PipelineError(_wide_hole(hole, mesh, file))
+
+
+def _wide_hole(hole: Hole, mesh: Any, file: str) -> str:
+    x, y, z = (f"{v:.0f}" for v in 1000 * (hole.centre_m - [0, 0, mesh.bounds[0, 2]]))
+    return (
+        f"{file}: expected a closed surface, found a hole {1000 * hole.width_m:.0f} mm wide at ({x}, {y}, {z}) mm "
+        "of the upright object; close it where you made the mesh"
+    )
 
 
 def _filled(mesh: Any, found: list[Hole]) -> Any:
@@ -262,9 +281,4 @@ def _check_alone(result: Mesh, file: str) -> None:
 
     other = crumbs.beside(trimesh.Trimesh(*result, process=False))
     if other is not None:
-        x, y, z = (f"{v:.0f}" for v in 1000 * other.mean(axis=0))
-        width = 1000 * np.ptp(other, axis=0).max()
-        raise Certain(
-            f"{file}: expected a container alone, found something {width:.0f} mm wide apart from it at "
-            f"({x}, {y}, {z}) mm of the upright object; remove it, or join them, where you made the file"
-        )
+        raise Certain(crumbs.alone(file, other, "apart from it", "remove it, or join them,"))

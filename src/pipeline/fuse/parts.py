@@ -6,7 +6,10 @@ import numpy as np
 
 Mesh = tuple[np.ndarray, np.ndarray]
 MOST_PARTS = 200
-LEVEL, FLAT = 0.999, 1e-3  # a normal's z, and heights as a share of the mesh's size, of what is level
+LEVEL, FLAT = (
+    0.9,
+    0.06,
+)  # a normal's z, and heights as a share of the mesh's size, of a liquid's top: menisci, foam
 LEAST_WIDTH, LEAST_TOP = 0.4, 0.5  # of the mesh's width, and of the box around the top: a filling's
 
 
@@ -44,6 +47,19 @@ def _solid(vertices: np.ndarray, triangles: np.ndarray) -> Any:
     return manifold3d.Manifold(manifold3d.Mesh64(vertices, np.ascontiguousarray(triangles, np.uint64)))
 
 
+def body_and_highest(mesh: Any) -> tuple[Any, np.ndarray] | None:
+    """Return a trimesh's part of the largest area, and the corners (2, 3) of the box around the highest of the others."""
+    labels = _labels(mesh)
+    if not 0 < labels.max() < MOST_PARTS:
+        return None
+    body = labels == np.bincount(labels, mesh.area_faces).argmax()
+    tops = np.where(body, -np.inf, mesh.triangles[..., 2].max(axis=1))
+    corners = mesh.triangles[labels == labels[tops.argmax()]].reshape(-1, 3)
+    return mesh.submesh([body], append=True, repair=False), np.stack(
+        [corners.min(axis=0), corners.max(axis=0)]
+    )
+
+
 def filling(mesh: Any) -> np.ndarray | None:
     """Return which triangles (F,) of an upright trimesh are a part with a level top inside of the rest, as liquid is; or None.
 
@@ -61,7 +77,7 @@ def filling(mesh: Any) -> np.ndarray | None:
 
 
 def _fills(mesh: Any, own: np.ndarray) -> bool:
-    """Return whether the triangles (F,) lie inside of the rest, wide and with a level top."""
+    """Return whether the triangles (F,) lie inside of the rest, wide and with a nearly level top."""
     corners, (left, right) = mesh.triangles[own], mesh.bounds
     low, top = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
     widths = (top - low)[:2]

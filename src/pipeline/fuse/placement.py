@@ -1,6 +1,6 @@
 """The one object on the table: what belongs to it, where its frame is."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import ndimage
@@ -87,8 +87,9 @@ def find(
     for plane in table.planes(near.places_m, eyes, name, rng):
         try:
             first = place(some, _above(near, plane, views), plane, middle, views, name)
-            plane = _under(some, plane, first, eyes) if raised_m is None else plane.raised(raised_m)
-            return plane, place(some, _above(near, plane, views), plane, middle, views, name)
+            under = _under(some, plane, first, eyes) if raised_m is None else plane.raised(raised_m)
+            found = place(some, _above(near, under, views), under, middle, views, name)
+            return under, replace(found, raised_m=plane.offset_m - under.offset_m)
         except NoObject as failure:
             failures.append(failure)
     raise failures[0]

@@ -48,6 +48,7 @@ class Located:
             "table_plane_world": [*self.plane.normal.tolist(), self.plane.offset_m],
             "table_rms_m": self.plane.rms_m,
             "table_spread_m": self.spread_m,
+            "raised_m": self.placement.raised_m,
             "eyes_object_m": eyes,
             "poses": "registered" if self.registration else "refined" if self.is_refined else "given",
             "poses_off_m": self.poses_off_m,
@@ -72,6 +73,11 @@ def complaints(facts: dict[str, Any]) -> list[str]:
         told.append(
             f"depth is noisy: points of the table spread by {1e3 * spread_m:.1f} mm, which tears thin walls; "
             "record from nearer, more views, or the mean of several images a view"
+        )
+    if placement.LEAST_BOARD_M < (raised_m := facts.get("raised_m", 0.0)) < placement.THICK_M:
+        told.append(
+            f"it stands on something level, {1e3 * raised_m:.0f} mm above the table around, whose top counts as the table; if that is "
+            "a foot of its own, a scan cannot tell: drop a mesh of it"
         )
     if left_out := facts.get("views_left_out"):
         shown = ", ".join(left_out[:3]) + (f" and {len(left_out) - 3} more" if len(left_out) > 3 else "")

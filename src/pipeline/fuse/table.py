@@ -42,12 +42,14 @@ class Plane:
 @dataclass(frozen=True)
 class Placement:
     """Where the object stands: T_object_world, its bounds (2, 3) and footprint cells (nx, ny) from `bounds_m[0]` on,
-    object frame, both with a margin; the seen points (N, 3) above the table that belong to it."""
+    object frame, both with a margin; the seen points (N, 3) above the table that belong to it; raised_m: how much higher than the
+    table around it is what it stands on."""
 
     T_object_world: np.ndarray
     bounds_m: np.ndarray
     footprint: np.ndarray
     points_m: np.ndarray
+    raised_m: float = 0.0
 
     def covers(self, x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
         """Return whether (x, y) of the object frame are within the footprint."""

@@ -219,6 +219,7 @@ def _rim(
     ix, iy = np.nonzero(pool[:, :, level])
     centre = np.array([axes[0][ix].mean(), axes[1][iy].mean()])
     start = max(axes[2][level] - 5 * cell, axes[2][np.nonzero(pool.any(axis=(0, 1)))[0][0]])
+    start = min(start, top_m - cell / 2)  # of a shallow one all cells may be level with its rim
     for _ in range(3):
         rim = _rim_about(surface, centre, start, top_m)
         centre = rim[:, :2].mean(axis=0)
