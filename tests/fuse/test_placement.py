@@ -161,6 +161,7 @@ def test_an_object_on_a_board_of_markers_stands_on_it(tmp_path, width_m):
     lower = box(0.0, 0.0, (0.9, 0.9, 0.02), recording.TABLE_HEIGHT_M - 0.025)
     plane, place = found(tmp_path, board, lower, table=False)
     assert plane.offset_m == pytest.approx(-recording.TABLE_HEIGHT_M, abs=0.0007)
+    assert place.raised_m == pytest.approx(0.005, abs=0.001)
     check_cup(place)
     views = layouts.read(tmp_path)
     assert posing.off_m(views, place) < posing.OFF_M

@@ -59,6 +59,13 @@ def test_views_that_do_not_fit_and_colours_that_do_not_lie_over_depth_are_told()
     assert "another size than depth" in colours
 
 
+@pytest.mark.parametrize(("raised_m", "told"), [(0.0003, False), (0.006, True), (0.02, True), (0.06, False)])
+def test_a_board_under_the_object_is_told_and_a_turntable_is_not(raised_m, told):
+    facts = {"poses": "given", "poses_off_m": 0.0, "table_spread_m": 0.001, "raised_m": raised_m}
+    found = " ".join(recorded.complaints(facts))
+    assert (f"stands on a board, {1e3 * raised_m:.0f} mm above the table" in found) == told
+
+
 @pytest.mark.parametrize(("spread_m", "told"), [(0.0021, 0), (0.0033, 1)])
 def test_depth_too_noisy_for_walls_is_named(spread_m, told):
     found = recorded.complaints({"poses": "given", "poses_off_m": 0.0, "table_spread_m": spread_m})

@@ -76,8 +76,8 @@ def complaints(facts: dict[str, Any]) -> list[str]:
         )
     if placement.LEAST_BOARD_M < (raised_m := facts.get("raised_m", 0.0)) < placement.THICK_M:
         told.append(
-            f"it stands on something level, {1e3 * raised_m:.0f} mm above the table around, whose top counts as the table; if that is "
-            "a foot of its own, a scan cannot tell: drop a mesh of it"
+            f"it stands on a board, {1e3 * raised_m:.0f} mm above the table around, whose top counts as the table; if that is a "
+            "foot of its own, a scan cannot tell: drop a mesh of it"
         )
     if left_out := facts.get("views_left_out"):
         shown = ", ".join(left_out[:3]) + (f" and {len(left_out) - 3} more" if len(left_out) > 3 else "")
