@@ -271,7 +271,7 @@ def test_liquid_in_a_mesh_is_told(tmp_path, radius_mm):
 
 def test_a_sheet_of_liquid_in_a_mesh_is_named(tmp_path):
     with pytest.raises(
-        PipelineError, match="level sheet in it, as of liquid, 60 mm above its base; remove it"
+        PipelineError, match="part with a level top in it, as of liquid, 60 mm above its base; remove it"
     ):
         dropped(tmp_path / "mug", thin_cup(40, 90, 3), turned((0, 60), (36.9, 60)))
 

@@ -290,3 +290,32 @@ def test_colours_of_another_size_are_not_used_and_that_is_known(recorded, tmp_pa
         pose.unlink()
     views = layouts.read(tmp_path / "cup")
     assert (len(views.colours) == len(recorded), views.colours_differ) == (used, not used)
+
+
+def test_a_camera_of_open3d_without_a_size_is_one_of_any(recorded, tmp_path):
+    writers.open3d(tmp_path / "cup", recorded)
+    own = o3d.camera.PinholeCameraIntrinsic()
+    own.intrinsic_matrix = camera.intrinsics()
+    o3d.io.write_pinhole_camera_intrinsic(str(tmp_path / "cup" / "camera_intrinsic.json"), own)
+    assert len(layouts.read(tmp_path / "cup").names) == len(recorded)
+
+
+@pytest.mark.parametrize(
+    ("name", "holds_poses"),
+    [
+        ("poses.txt", True),
+        ("camera_poses", True),
+        ("KeyFrameTrajectory.txt", True),
+        ("odometry.csv", True),
+        ("transforms.json", True),
+        ("cameras", True),
+        ("pose.jpg", False),
+        ("pose_guide.md", False),
+        ("trajectory_plan.png", False),
+        ("odometer.jpg", False),
+        ("cameras.txt", False),
+        ("purpose.txt", False),
+    ],
+)
+def test_names_of_files_that_hold_poses(name, holds_poses):
+    assert bool(layouts._POSES.fullmatch(name)) == holds_poses

@@ -56,6 +56,7 @@ def test_views_that_do_not_fit_and_colours_that_do_not_lie_over_depth_are_told()
     assert recorded.complaints(facts | {"views_left_out": [], "colours_differ": False}) == []
     left_out, colours = recorded.complaints(facts | {"views_left_out": list("abcde"), "colours_differ": True})
     assert left_out.startswith("a, b, c and 2 more: left out")
+    assert left_out.endswith("; remove them")
     assert "another size than depth" in colours
 
 

@@ -38,11 +38,13 @@ class Mistake:
     depth_factor: float = 1.0
 
 
-def checked(views: Views, name: str, rng: np.random.Generator) -> tuple[Views, list[str]]:
+def checked(
+    views: Views, name: str, rng: np.random.Generator, are_given: bool = True
+) -> tuple[Views, list[str]]:
     """Return the views whose poses fit the others', and the names of those left out.
 
     A `PipelineError` names the mistake that explains the disagreement: poses world→camera, another unit of lengths or
-    depths, another convention of camera axes or quaternions.
+    depths, another convention of camera axes or quaternions; of given poses, as found ones fit any, another focal length.
     """
     _check_range(views, name)
     if len(views.depths_m) < 2:
@@ -54,7 +56,7 @@ def checked(views: Views, name: str, rng: np.random.Generator) -> tuple[Views, l
     left_out = [view for view, is_bad in zip(views.names, bad, strict=True) if is_bad]
     if np.median(np.nan_to_num(shares)) < LEAST or bad.mean() > MOST_LEFT_OUT:
         raise PipelineError(_named(views, sample, poses, float(np.nan_to_num(shares).mean()), left_out, name))
-    mistake = _of_scale(views, sample, poses, name)
+    mistake = _of_scale(views, sample, poses, name) if are_given else None
     if mistake is not None:
         raise PipelineError(_sentence(mistake, name))
     return only(views, ~bad), left_out

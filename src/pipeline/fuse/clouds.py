@@ -33,16 +33,13 @@ def read(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
     """Return points (N, 3) in the file's units and, where it has them, their normals (N, 3)."""
     points, normals = _arrays(path) if path.suffix.lower() == ".npz" else _open3d(path)
     finite = np.isfinite(points).all(axis=1)
-    told = (
-        finite
-        if normals is None
-        else np.isfinite(normals).all(axis=1) & np.any(np.abs(normals) > 1e-9, axis=1)
-    )
-    if np.count_nonzero(told & finite) < LEAST_TOLD * np.count_nonzero(finite):
-        normals = None  # room for them was left
     if normals is not None:
-        finite &= told
-        normals = normals[finite] / np.linalg.norm(normals[finite], axis=1, keepdims=True)
+        told = finite & np.isfinite(normals).all(axis=1) & (np.abs(normals) > 1e-9).any(axis=1)
+        if np.count_nonzero(told) < LEAST_TOLD * np.count_nonzero(finite):
+            normals = None  # room for them was left
+        else:
+            finite = told
+            normals = normals[finite] / np.linalg.norm(normals[finite], axis=1, keepdims=True)
     points, index, times = np.unique(points[finite], axis=0, return_index=True, return_counts=True)
     own = times < MARK * np.median(times) if len(times) else times > 0
     points, index = points[own], index[own]

@@ -60,7 +60,9 @@ def _opened(
     unseen = (value <= 0) & ~measured
     reached = ndimage.binary_propagation(start, mask=start | (unseen & (beyond > 0)))
     opened = unseen & ndimage.binary_dilation(reached)
-    return np.where(opened, np.maximum(value, np.clip(beyond / truncation, -1.0, 1.0)), value)
+    return np.where(opened, np.maximum(value, np.clip(beyond / truncation, -1.0, 1.0)), value).astype(
+        value.dtype
+    )
 
 
 def _beyond_wall_inside(

@@ -58,6 +58,8 @@ def shares_seen(surface: Surface) -> dict[str, float | None]:
 
 def step_m(surface: Surface) -> float | None:
     """Return the height above the table of what is level all round the foot, as a board or a saucer under it is; or None."""
+    if not surface.inner.any():
+        return None
     x, y, z = surface.vertices_m.T
     low = (z > STEP_M[0]) & (z < min(STEP_M[1], LOW_SHARE * z.max())) & ~surface.inner
     level = low & (vertex_normals(surface.vertices_m, surface.triangles, 1)[:, 2] > LEVEL_COSINE)
@@ -90,7 +92,7 @@ def complaints(
     if stepped_m is not None:
         told.append(
             f"something level, {stepped_m * 1e3:.0f} mm above the table, is all round its foot and was fused with it: "
-            "if that is a board, a coaster or a saucer, take it away"
+            "if that is a board, a coaster or a saucer, and not its own foot, take it away"
         )
     return told
 

@@ -65,8 +65,8 @@ def _from_mesh(
         if emptied is None:
             raise
         raise PipelineError(
-            f"{file}: expected a container alone, found a level sheet in it, as of liquid, {1000 * emptied.level_m:.0f} mm above "
-            "its base; remove it where you made the mesh"
+            f"{file}: expected a container alone, found a part with a level top in it, as of liquid, "
+            f"{1000 * emptied.level_m:.0f} mm above its base; remove it where you made the mesh"
         ) from error
     if not mending.holds(whole):
         _check_body_alone(mesh, options.wall_m, file)
@@ -84,7 +84,10 @@ class _Emptied:
 
     def facts(self, whole: Mesh) -> dict[str, Any]:
         """Return the level, and what goes in with and without the part, where that is a difference."""
-        with_m3 = cavity(*whole, name="").capacity_m3 if mending.holds(whole) else 0.0
+        try:
+            with_m3 = cavity(*whole, name="").capacity_m3
+        except PipelineError:
+            with_m3 = 0.0
         if self.capacity_m3 < MORE_WITHOUT * with_m3:
             return {}
         return {"filled_to_m": self.level_m, "capacity_m3": with_m3, "capacity_without_m3": self.capacity_m3}
@@ -106,7 +109,7 @@ def _without_filling(mesh: Any, wall_m: float | None, file: str) -> _Emptied | N
 
 def _check_body_alone(mesh: Any, wall_m: float | None, file: str) -> None:
     """Refuse an upright trimesh that holds nothing with its parts, as a spoon in it or a lid, and does without them."""
-    found = parts.body_and_highest(mesh)
+    found = parts.body_and_highest(crumbs.without(mesh.copy())[0])
     if found is None:
         return
     body, other = found

@@ -97,8 +97,11 @@ def intrinsics(folder: Path, image: Path) -> tuple[np.ndarray, Path]:
             raise PipelineError(
                 f"{path}: expected the key intrinsic_matrix (9 numbers by columns), found {found!r:.60}; export it again"
             )
-        if "width" in found and "height" in found:
-            _check_size([found["width"], found["height"]], image, path)
+        width_height: list[Any] = [found.get("width"), found.get("height")]
+        if all(
+            isinstance(side, int) and side > 0 for side in width_height
+        ):  # Open3D writes -1 where none was given
+            _check_size(width_height, image, path)
         K = numbers(found["intrinsic_matrix"], (9,), f"{path}: intrinsic_matrix", "the camera's intrinsics")
         return camera(K.reshape(3, 3).T, str(path)), path
     size = 3 if path.parent == folder else 4
@@ -106,11 +109,11 @@ def intrinsics(folder: Path, image: Path) -> tuple[np.ndarray, Path]:
     return camera(K[:3, :3], str(path)), path
 
 
-def _check_size(size: list[Any], image: Path, where: Path) -> None:
+def _check_size(size: list[int], image: Path, where: Path) -> None:
     """Refuse a camera whose images have another size (width, height) than the depth `image`."""
     height, width = pixels(image, DEPTHS, A_DEPTH).shape
     if size != [width, height]:
-        found = "×".join(f"{side!r:.20}" for side in size)
+        found = f"{size[0]}×{size[1]}"
         raise PipelineError(
             f"{where}: expected the camera of images like {image.name}, {width}×{height} pixels, found one of {found}; write the "
             "depth camera's own, or export depth aligned to colour"

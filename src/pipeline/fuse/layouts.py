@@ -19,7 +19,9 @@ RECORDINGS = {"7-scenes": seven_scenes, "open3d": open3d_folders, "tum": tum, "b
 MOST_VIEWS = 200
 # Names of what holds poses in other layouts: views beside it were not meant to be without.
 _POSES = re.compile(
-    r"(.*[^a-z])?poses?([^a-z].*)?|.*(traj|odom|ground_?truth|transforms).*|cameras(\..*)?", re.I
+    r"(?!cameras\.txt$)((.*[^a-z])?poses?([^a-z.][^.]*)?|.*(traj(ectory)?|odom(etry)?|ground_?truth|transforms)|cameras)"
+    r"(\.(txt|json|csv|log|npy|npz|ya?ml|tum))?",
+    re.IGNORECASE,
 )
 _OF_OTHERS = {"up": "up comes from the table", "wall_mm": "both sides of the wall are measured"}
 _EXPECTED = (

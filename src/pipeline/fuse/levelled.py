@@ -95,6 +95,8 @@ def raised_m(views: Views, view: Levelled) -> float:
     v, u = np.nonzero(depth)
     x, y, z = frames.apply(view.T_level_camera, unprojected(4 * u, 4 * v, depth[v, u], views.intrinsics[i])).T
     z = z[(np.hypot(x, y) < AROUND_M) & (np.abs(z) < HIGHEST_M)]
+    if len(z) == 0:
+        return 0.0
     counts, edges = np.histogram(z, np.arange(-HIGHEST_M, SAME_M, SAME_M))
     return max(0.0, -float(np.median(z[np.abs(z - edges[counts.argmax()] - SAME_M / 2) < SAME_M])))
 

@@ -80,7 +80,7 @@ def mended(
     field = wrapped(*arrays(mesh))
     result = field.surface()
     if wide:
-        _check_enclosed(wide[0], mesh, field, file)
+        _check_enclosed(wide[0], mesh, field, result, file)
     _check_kept(mesh, result, file)
     _check_alone(result, file)
     _check_thick(mesh, result, field.cell_m, file)
@@ -181,12 +181,12 @@ def _is_wide(hole: Hole, mesh: Any) -> bool:
     return hole.width_m > LARGEST_HOLE * float((high - low).max()) and not at_base
 
 
-def _check_enclosed(hole: Hole, mesh: Any, field: Field, file: str) -> None:
+def _check_enclosed(hole: Hole, mesh: Any, field: Field, result: Mesh, file: str) -> None:
     """Refuse when the inside of the wall was reached through a hole; cracks and the edges of a sheet on the wall are none."""
     points, _ = sampling.uniform_points(*arrays(mesh), SAMPLES, np.random.default_rng(0))
     index = np.rint((points - field.low_m) / field.cell_m).astype(int)
     at_solid = ndimage.binary_dilation(field.value_m > 0, iterations=2)[tuple(index.T)]
-    if at_solid.mean() < ENCLOSED or not holds(field.surface()):
+    if at_solid.mean() < ENCLOSED or not holds(result):
         raise PipelineError(_wide_hole(hole, mesh, file))
 
 

@@ -4,12 +4,11 @@ from typing import Any
 
 import numpy as np
 
-Mesh = tuple[np.ndarray, np.ndarray]
+from pipeline.fuse.wrapping import Mesh
+
 MOST_PARTS = 200
-LEVEL, FLAT = (
-    0.9,
-    0.06,
-)  # a normal's z, and heights as a share of the mesh's size, of a liquid's top: menisci, foam
+# A normal's z, and heights as a share of the mesh's size, of a liquid's top: menisci, foam.
+LEVEL, FLAT = 0.9, 0.06
 LEAST_WIDTH, LEAST_TOP = 0.4, 0.5  # of the mesh's width, and of the box around the top: a filling's
 
 
@@ -25,7 +24,7 @@ def united(mesh: Any) -> Mesh | None:
     if labels.max() >= MOST_PARTS:
         return None
     solids = []
-    for part in mesh.submesh([np.flatnonzero(labels == k) for k in range(labels.max() + 1)]):
+    for part in mesh.submesh([np.flatnonzero(labels == k) for k in range(labels.max() + 1)], repair=False):
         trimesh.repair.fix_winding(part)
         solid = _solid(part.vertices, part.faces)
         if solid.volume() < 0:

@@ -87,9 +87,13 @@ def find(
     for plane in table.planes(near.places_m, eyes, name, rng):
         try:
             first = place(some, _above(near, plane, views), plane, middle, views, name)
-            under = _under(some, plane, first, eyes) if raised_m is None else plane.raised(raised_m)
-            found = place(some, _above(near, under, views), under, middle, views, name)
-            return under, replace(found, raised_m=plane.offset_m - under.offset_m)
+            if raised_m is None:
+                under, up_m = _under(some, plane, first, eyes)
+            else:
+                under, up_m = plane.raised(raised_m), raised_m
+            return under, replace(
+                place(some, _above(near, under, views), under, middle, views, name), raised_m=up_m
+            )
         except NoObject as failure:
             failures.append(failure)
     raise failures[0]
@@ -188,8 +192,11 @@ def _platter_m(placement: Placement, least: int) -> float | None:
     return float(np.median(z[np.abs(z - height) < FLAT_M]))
 
 
-def _under(points_m: np.ndarray, plane: Plane, placement: Placement, eyes: np.ndarray) -> Plane:
-    """Return what the object stands on, fitted to the points near it: a platter, a board, or the table, which is not quite flat."""
+def _under(points_m: np.ndarray, plane: Plane, placement: Placement, eyes: np.ndarray) -> tuple[Plane, float]:
+    """Return what the object stands on, fitted to the points near it, and how much higher than the table it is.
+
+    It is a platter, a board, or the table, which is not quite flat.
+    """
     x, y, z = frames.apply(placement.T_object_world, points_m).T
     raised_m = _platter_m(placement, LEAST_POINTS if len(eyes) > 1 else LEAST_RAISED)
     if raised_m is not None:
@@ -199,8 +206,8 @@ def _under(points_m: np.ndarray, plane: Plane, placement: Placement, eyes: np.nd
         raised_m, near = _board(x, y, z, placement) or (0.0, near_table)
     plane = plane.raised(raised_m)
     if len(near) < LEAST_POINTS:
-        return plane
-    return table.refined(points_m[near], plane.normal, plane.offset_m, eyes)
+        return plane, raised_m
+    return table.refined(points_m[near], plane.normal, plane.offset_m, eyes), raised_m
 
 
 def _board(

@@ -79,11 +79,10 @@ def complaints(facts: dict[str, Any]) -> list[str]:
             f"it stands on a board, {1e3 * raised_m:.0f} mm above the table around, whose top counts as the table; if that is a "
             "foot of its own, a scan cannot tell: drop a mesh of it"
         )
-    if left_out := facts.get("views_left_out"):
+    if left_out := [*facts.get("views_left_out", []), *facts.get("views_without_object", [])]:
         shown = ", ".join(left_out[:3]) + (f" and {len(left_out) - 3} more" if len(left_out) > 3 else "")
-        told.append(
-            f"{shown}: left out, as they do not fit the other views; correct their poses or remove them"
-        )
+        cure = "remove them" if facts["poses"] == "registered" else "correct their poses or remove them"
+        told.append(f"{shown}: left out, as they do not fit the other views or show no object; {cure}")
     if facts.get("colours_differ"):
         told.append(
             "colours were not used to find poses, as their images are of another size than depth; align colour to depth"
@@ -100,7 +99,7 @@ def located(views: Views, name: str, rng: np.random.Generator) -> Located:
     found: dict[str, Any] = {}
     if not views.T_world_cameras:
         views, found = registration.registered(views, name, rng)
-    views, left_out = agreement.checked(views, name, rng)
+    views, left_out = agreement.checked(views, name, rng, are_given=not found)
     plane, place = placement.find(views, name, rng)
     if found:
         return Located(views, plane, place, left_out, found)

@@ -134,13 +134,16 @@ def _as_high(
     Those that then show no object join the failures.
     """
     heights_m = np.array([raised_m(views, view) for view in stood])
+    tops_m = np.array([view.points_m[:, 2].max() for view in stood])
     usual_m = float(np.median(heights_m)) if len(stood) else 0.0
     if usual_m < LEAST_RAISED_M:
         return stood
+    right = heights_m >= usual_m / 2
+    # Others either stand too low, or see nothing lower than the base: their object is as tall as it is.
+    too_low = ~right & (tops_m > np.median(tops_m[right]) + usual_m / 2)
     alike = []
-    for view, height_m in zip(stood, heights_m, strict=True):
+    for view, is_low in zip(stood, too_low, strict=True):
         try:
-            is_low = height_m < usual_m / 2
             alike.append(level(views, view.number, name, rng, usual_m) if is_low else view)
         except PipelineError as failure:
             failures[views.names[view.number]] = failure

@@ -34,7 +34,8 @@ def found(
 def open_above(points_m: np.ndarray, surface: Surface, name: str, rng: np.random.Generator) -> np.ndarray:
     """Return which points (N, 3) of a surface have nothing close above them, as the underside of a table's slab has its top."""
     plane = next(iter(table.planes(points_m, points_m.mean(axis=0)[None], name, rng)))
-    up = np.broadcast_to(plane.normal, points_m.shape)
+    height = plane.height(points_m)  # the table's own thickness is less than what stands on it
+    up = np.broadcast_to(plane.normal if height.max() > -height.min() else -plane.normal, points_m.shape)
     return surface.hit(points_m + SLIGHTLY_M * up, up) > SLAB_M
 
 
