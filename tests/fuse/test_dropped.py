@@ -181,6 +181,18 @@ def test_a_floor_thinner_than_the_table_is_rough_stays_and_a_slab_is_its_top(tmp
     assert capacity_ml(result) == pytest.approx(np.pi * 39**2 * 89 / 1e3, rel=0.01)
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_thick_slab_leaves_no_brim(tmp_path, seed):
+    """Its mean height is nearly that of the points: its top was found by chance."""
+    slab = trimesh.creation.box((0.4, 0.4, 0.02)).apply_translation([0, 0, -0.01])
+    slab = trimesh.Trimesh(*trimesh.remesh.subdivide_to_size(slab.vertices, slab.faces, 0.008))
+    (tmp_path / "cup").mkdir()
+    (tmp_path / "cup" / "scan.yaml").write_text("on_table: true\n")
+    trimesh.util.concatenate([thin_cup(40, 90, 3), slab]).export(tmp_path / "cup" / "cup.ply")
+    vertices, _ = fused(tmp_path / "cup", **OPTIONS | {"seed": seed}).mesh
+    np.testing.assert_allclose(np.ptp(vertices, axis=0), [0.08, 0.08, 0.09], atol=3e-4)
+
+
 def test_same_mesh_same_cloud(tmp_path):
     cup = shape("small_cup")
     first, second = (drop(tmp_path / name, cup.vertices_m, cup.triangles).cloud for name in ("a", "b"))

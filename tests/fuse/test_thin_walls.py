@@ -164,6 +164,16 @@ def test_an_object_without_an_inside_is_named_in_one_sentence():
     assert "lid" in told[0]
 
 
+def test_a_step_all_round_is_a_step_unless_no_inside_was_found():
+    outside = [(0, 0), (0.044, 0), *((r / 1000, 0.004) for r in range(44, 29, -1)), (0.03, 0.06)]
+    profile = [*outside, (0.027, 0.06), (0.027, 0.006), (0, 0.006)]
+    cup = trimesh.creation.revolve(np.array(profile), sections=96)
+    inner = (np.hypot(*cup.vertices[:, :2].T) < 0.028) & (cup.vertices[:, 2] > 0.005)
+    surface = tsdf.Surface(np.array(cup.vertices), np.array(cup.faces), np.ones(len(inner), bool), inner)
+    assert coverage.step_m(surface) == pytest.approx(0.004)
+    assert coverage.step_m(replace(surface, inner=np.zeros(len(inner), bool))) is None
+
+
 def test_a_depth_that_no_view_saw_is_a_guess():
     told = coverage.complaints({"floor": 0.1, "inner_wall": 0.9, "rim": 1.0, "outer_wall": 0.9})
     assert len(told) == 2
