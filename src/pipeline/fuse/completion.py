@@ -32,7 +32,7 @@ def completed(
     shadow_inside = _unseen(inside, measured) > LEAST_UNSEEN
     if not shadow_inside and _unseen(outside, measured) <= LEAST_UNSEEN_OUTSIDE:
         return value
-    value, room, truncation = value.copy(), walled_in.copy(), truncation_m / voxel_m
+    value, room, truncation = value.copy(), walled_in, truncation_m / voxel_m
     levels = np.flatnonzero(walled_in.any(axis=(0, 1)))
     for z in levels if shadow_inside else ():
         beyond = _beyond_wall_inside(value[..., z], measured[..., z], room[..., z], voxel_m)

@@ -98,9 +98,8 @@ def intrinsics(folder: Path, image: Path) -> tuple[np.ndarray, Path]:
                 f"{path}: expected the key intrinsic_matrix (9 numbers by columns), found {found!r:.60}; export it again"
             )
         width_height: list[Any] = [found.get("width"), found.get("height")]
-        if all(
-            isinstance(side, int) and side > 0 for side in width_height
-        ):  # Open3D writes -1 where none was given
+        # Open3D writes -1 where none was given.
+        if all(isinstance(side, int) and side > 0 for side in width_height):
             _check_size(width_height, image, path)
         K = numbers(found["intrinsic_matrix"], (9,), f"{path}: intrinsic_matrix", "the camera's intrinsics")
         return camera(K.reshape(3, 3).T, str(path)), path
