@@ -19,8 +19,6 @@ PYTHONS := python3.11 python3.12 python3
 TYPED := src
 # Tests run as the workflow's jobs do, one thread each: two processes with two threads each wait for each other most of the time.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
-# Some counts of particles turn on the last bits of the arithmetic, which are others in code for other processors: tests have one kind.
-ONE_KIND := $(shell grep -qs avx512vl /proc/cpuinfo && echo NUMBA_CPU_NAME=skylake-avx512)
 
 .PHONY: all test lint docs setup format track mlflow-server FORCE
 .DELETE_ON_ERROR:
@@ -32,7 +30,7 @@ reports/%: $(STAMP) FORCE
 	$(BIN)/snakemake -c$(CORES) $@
 
 test: lint
-	$(ONE_THREAD) $(ONE_KIND) $(BIN)/python -m pytest -n $(CORES) --dist loadscope
+	$(ONE_THREAD) $(BIN)/python -m pytest -n $(CORES) --dist loadscope
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

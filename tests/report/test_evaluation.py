@@ -219,3 +219,9 @@ def test_the_pages_are_the_same_bytes_for_the_same_numbers(tmp_path):
     written = (tmp_path / "one.pdf").read_bytes()
     assert (tmp_path / "two.pdf").read_bytes() == written
     assert written.count(b"/Type /Page ") == 5
+
+
+def test_an_area_that_nothing_tells_is_left_out():
+    """Where every filling of a half is spilled there is none to rank: JSON has no word for it."""
+    assert by.with_interval("area", np.full(5, np.nan)) == {}
+    assert by.with_interval("area", np.array([0.5])) == {"area": 0.5}

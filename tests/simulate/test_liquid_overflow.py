@@ -6,8 +6,9 @@ from pipeline.simulate import liquid, rest
 from pipeline.simulate.liquid import Vessel
 from pipeline.simulate.particles import particles
 
-SEEDS = (1, 2, 3)
+VESSELS = ("cylinder", "thin", "cone", "bowl")
 ROOMS = (6, 10, 15, 20)
+SEEDS = range(1, 25)
 
 
 def taken_before_it_overflows(
@@ -31,18 +32,8 @@ def taken_before_it_overflows(
 TOO_LITTLE = pytest.mark.xfail(reason="the lattice of the top layer takes some of what falls in")
 
 
-# Within half a layer of the brim the order of the particles decides, and with it the last bits of the arithmetic.
-TOO_FAR = pytest.mark.xfail(reason="with this free room alone it takes up to 7 particles too many or too few")
-FAR = [("bowl", 6), ("bowl", 10)]
-GOOD = [
-    *((name, room) for name in ("cylinder", "thin") for room in (6, 10, 15)),
-    *(("cone", room) for room in (6, 10, 15)),
-    ("bowl", 15),
-]
-CASES = [*GOOD, *(pytest.param(*case, marks=TOO_FAR) for case in FAR)]
-
-
-@pytest.mark.parametrize(("name", "room"), CASES)
+@pytest.mark.parametrize("room", ROOMS)
+@pytest.mark.parametrize("name", VESSELS)
 def test_filled_gently_it_overflows_when_its_free_room_is_taken(
     request: pytest.FixtureRequest, name: str, room: int
 ) -> None:
@@ -51,7 +42,7 @@ def test_filled_gently_it_overflows_when_its_free_room_is_taken(
     assert taken == pytest.approx(room, abs=3)
 
 
-@pytest.mark.parametrize("name", ["cylinder", "thin", "cone", "bowl"])
+@pytest.mark.parametrize("name", VESSELS)
 def test_over_several_free_rooms_it_overflows_at_its_capacity(
     request: pytest.FixtureRequest, name: str
 ) -> None:
@@ -63,12 +54,12 @@ def test_over_several_free_rooms_it_overflows_at_its_capacity(
     assert np.abs(excess).max() < 0.02 * liquid.holds(vessel)
 
 
-@pytest.mark.parametrize("name", ["cylinder", "thin", "cone", "bowl"])
+@pytest.mark.parametrize("name", VESSELS)
 def test_filled_slowly_it_overflows_at_its_capacity(request: pytest.FixtureRequest, name: str) -> None:
     """The calibration is one of the mean, and of the particles at hand: other roundings order them otherwise near the brim."""
     vessel = request.getfixturevalue(name)
     excess = [
-        np.mean([taken_before_it_overflows(vessel, room, seed, wait_s=0.25) for seed in SEEDS]) - room
+        np.mean([taken_before_it_overflows(vessel, room, seed, wait_s=0.25) for seed in SEEDS[:3]]) - room
         for room in ROOMS
     ]
     assert abs(np.mean(excess)) < 0.015 * liquid.holds(vessel)

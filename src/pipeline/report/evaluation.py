@@ -122,8 +122,7 @@ def learning_numbers(learning: "pd.DataFrame") -> dict[str, float]:
         ordered = rows.sort_values("replicate")
         for measure in ("auc", "tpr_at_fpr_01"):
             values = ordered[measure].to_numpy()
-            if np.isfinite(values[0]):
-                numbers |= with_interval(f"{head}.{measure}", values)
+            numbers |= with_interval(f"{head}.{measure}", values)
         if split == "same":
             numbers[f"{head}.separable_share"] = float(rows["separable_share"].iloc[0])
             numbers[f"{head}.redrawn"] = int(rows["n_redrawn"].iloc[0])

@@ -29,8 +29,10 @@ def by_name(replicates: pd.DataFrame) -> dict[str, np.ndarray]:
 
 
 def with_interval(name: str, values: np.ndarray) -> Numbers:
-    """Return the value and the ends of its 95 % interval; ends that do not exist are left out."""
+    """Return the value and the ends of its 95 % interval; what does not exist (an area where all have one label) is left out."""
     value, low, high = interval(values)
+    if not np.isfinite(value):
+        return {}
     return {name: value} | ({f"{name}.low": low, f"{name}.high": high} if np.isfinite(low) else {})
 
 

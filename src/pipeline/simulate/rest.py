@@ -24,7 +24,7 @@ BRIMFUL, TOPPED = (
     -1,
 )  # keys among the settled states, of the first one at the brim; the others follow in steps of −2
 _LEVELS = 1.1
-_TOP_UP_FROM = 0.93  # of the capacity: a lattice that settles above this splashes over
+_TOP_UP_FROM = 0.93  # of the capacity: a lattice that settles above this splashes over, and lies otherwise than liquid topped up
 _ROOMS = (5, 10, 15, 20)  # particles of 500 that are missing to the capacity before a trial top-up
 _OF = 500
 _RUNS, _RUNS_OF_MANY, _MANY = (
@@ -34,6 +34,7 @@ _RUNS, _RUNS_OF_MANY, _MANY = (
 )  # top-ups of a trial's liquid; fewer where a vessel holds many, as one counts for less
 # A mean of one top-up a room that is further from the capacity tells enough: a share of it, and particles.
 _FAR, _FAR_AT_LEAST = 0.015, 4
+_FOR_GOOD = 0.01  # of the capacity
 _TOP_UPS, _STATES = 8, 5  # in a row; the last ones are kept
 _PORTIONS = 300  # a portion set down at once is this part of the capacity, one particle at least
 _PORTION_S = 0.1
@@ -61,7 +62,7 @@ def settle(vessel: Vessel, n: int, seed: int | tuple[int, ...]) -> np.ndarray:
     """
     rng = np.random.default_rng(seed)
     level = next(level for level in _levels() if level >= n)
-    at_rest = _settled(vessel, level) if level <= holds(vessel) else np.zeros((0, 3))
+    at_rest = _settled(vessel, level) if level <= _highest_level(vessel) else np.zeros((0, 3))
     if len(at_rest) < n:  # a level just below the rim can splash over it while it settles
         at_rest = _full(vessel, n, rng)
     lowest = _lowest(at_rest, n)
@@ -71,9 +72,14 @@ def settle(vessel: Vessel, n: int, seed: int | tuple[int, ...]) -> np.ndarray:
 def settle_all(vessel: Vessel) -> None:
     """Make every settled state that `settle` may ask for."""
     for level in _levels():
-        if level > holds(vessel):
+        if level > _highest_level(vessel):
             break
         _settled(vessel, level)
+
+
+def _highest_level(vessel: Vessel) -> float:
+    """Return up to how many particles a settled state is made of a lattice; above are those at the brim."""
+    return min(holds(vessel), _TOP_UP_FROM * particles_for(vessel, vessel.cavity.capacity_m3))
 
 
 def _levels() -> Iterator[int]:
@@ -94,20 +100,20 @@ def keeps(vessel: Vessel) -> float:
 
 
 def overflows_at(vessel: Vessel) -> float:
-    """Return how many particles are there just before the first runs over when liquid at rest is topped up: a mean.
+    """Return how many particles are there just before the first runs over when a trial's liquid is topped up: a mean.
 
-    From each of the states at the brim, with some free room, as a trial starts. Where it is far from the capacity, over fewer.
+    It starts as a trial does, with some free room. Where it is far from the capacity, over fewer. Never more than `_FOR_GOOD`
+    above what stays for good: a trial that starts with more is void.
     """
-    target, states = particles_for(vessel, vessel.cavity.capacity_m3), _topped(vessel)
+    target = particles_for(vessel, vessel.cavity.capacity_m3)
     rooms = _ROOMS * ((_RUNS if target < _MANY else _RUNS_OF_MANY) // len(_ROOMS))
     found: list[int] = []
     for turn, room in enumerate(rooms):
         if turn == len(_ROOMS) and abs(np.mean(found) - target) > max(_FAR * target, _FAR_AT_LEAST):
             break
-        start = _lowest(states[turn % len(states)], max(target - _scaled(target, room), 1))
-        jitter = np.random.default_rng(turn).normal(0.0, _JITTER * vessel.spacing_m, start.shape)
-        found.append(len(_topped_up(vessel, start + jitter, 1 + turn)))
-    return float(np.mean(found))
+        start = settle(vessel, max(target - _scaled(target, room), 1), turn)
+        found.append(len(_topped_up(vessel, start, 1 + turn)))
+    return min(float(np.mean(found)), holds(vessel) + _FOR_GOOD * target)
 
 
 def _scaled(target: int, room: int) -> int:
@@ -139,10 +145,11 @@ def _topped(vessel: Vessel) -> list[np.ndarray]:
         n = max(int(_TOP_UP_FROM * target), min(target, 8))
         while len(_settled(vessel, n)) < n:  # it splashed over
             n = len(vessel.settled[n]) - 1
-        states = [_topped_up(vessel, vessel.settled[n], 0)]
+        states = [_calmed(vessel, _topped_up(vessel, vessel.settled[n], 0), _CALM_S, SETTLE_DAMPING)]
         for turn in range(1, _TOP_UPS):
             left = max(len(states[-1]) - _scaled(target, _ROOMS[(turn - 1) % len(_ROOMS)]), 1)
-            states.append(_topped_up(vessel, _lowest(states[-1], left), turn))
+            topped = _topped_up(vessel, _lowest(states[-1], left), turn)
+            states.append(_calmed(vessel, topped, _CALM_S, SETTLE_DAMPING))
         ordered = sorted(states[-_STATES:], key=len)
         return [ordered.pop(_STATES // 2), *ordered]
 
@@ -170,16 +177,17 @@ def _topped_up(vessel: Vessel, start: np.ndarray, turn: int) -> np.ndarray:
     p = particles(n + 2 * target + 16, vessel.walls)
     p.x[:n, :3], p.count[0] = start, n
     dt, at_once = time_step_s(vessel), max(1, round(target / _PORTIONS))
-    rest(p, vessel.walls, dt, ITERATIONS, int(HOLD_S / dt), SETTLE_DAMPING)
+    left, well = rest(p, vessel.walls, dt, ITERATIONS, int(HOLD_S / dt), SETTLE_DAMPING)
     before = p.x[: p.count[0], :3].astype(float)
     for place in range(turn * 1000, turn * 1000 + target, at_once):
+        if left > 0 or not well:
+            break
         for k in range(at_once):
             _set_down(p, vessel, place + k)
         left, well = rest(p, vessel.walls, dt, ITERATIONS, int(_PORTION_S / dt), 0.0)
-        if left > 0 or not well:
-            break
-        before = p.x[: p.count[0], :3].astype(float)
-    return _calmed(vessel, before, _CALM_S, SETTLE_DAMPING)
+        if left == 0 and well:
+            before = p.x[: p.count[0], :3].astype(float)
+    return before
 
 
 def _kept(vessel: Vessel, at_rest: np.ndarray) -> np.ndarray:
