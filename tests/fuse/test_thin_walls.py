@@ -165,13 +165,25 @@ def test_an_object_without_an_inside_is_named_in_one_sentence():
 
 
 def test_a_step_all_round_is_a_step_unless_no_inside_was_found():
-    outside = [(0, 0), (0.044, 0), *((r / 1000, 0.004) for r in range(44, 29, -1)), (0.03, 0.06)]
-    profile = [*outside, (0.027, 0.06), (0.027, 0.006), (0, 0.006)]
-    cup = trimesh.creation.revolve(np.array(profile), sections=96)
-    inner = (np.hypot(*cup.vertices[:, :2].T) < 0.028) & (cup.vertices[:, 2] > 0.005)
-    surface = tsdf.Surface(np.array(cup.vertices), np.array(cup.faces), np.ones(len(inner), bool), inner)
+    surface = on_a_disc(0.03, 0.004)
     assert coverage.step_m(surface) == pytest.approx(0.004)
-    assert coverage.step_m(replace(surface, inner=np.zeros(len(inner), bool))) is None
+    assert coverage.step_m(replace(surface, inner=np.zeros(len(surface.inner), bool))) is None
+
+
+def test_a_block_under_a_cup_is_a_step_and_a_goblets_foot_is_none():
+    assert coverage.step_m(on_a_disc(0.03, 0.045)) == pytest.approx(0.045)
+    assert coverage.step_m(on_a_disc(0.006, 0.004)) is None
+
+
+def on_a_disc(foot_m: float, disc_m: float) -> tsdf.Surface:
+    """Return a cup whose foot has a radius of `foot_m`, on a disc of a radius of 44 mm, `disc_m` thick, as one surface."""
+    rim = disc_m + 0.056
+    outside = [(0, 0), (0.044, 0), *((r / 1000, disc_m) for r in range(44, 29, -1)), (foot_m, disc_m)]
+    outside += [*((foot_m, disc_m + h / 1000) for h in range(1, 20)), (0.03, disc_m + 0.021), (0.03, rim)]
+    profile = [*outside, (0.027, rim), (0.027, disc_m + 0.025), (0, disc_m + 0.025)]
+    cup = trimesh.creation.revolve(np.array(profile), sections=96)
+    inner = (np.hypot(*cup.vertices[:, :2].T) < 0.028) & (cup.vertices[:, 2] > disc_m + 0.024)
+    return tsdf.Surface(np.array(cup.vertices), np.array(cup.faces), np.ones(len(inner), bool), inner)
 
 
 def test_a_depth_that_no_view_saw_is_a_guess():

@@ -14,7 +14,9 @@ MUCH_THICKENED = 0.01  # of the outside: is named
 POOR = 0.8  # a part of which less was seen is named
 GUESSED = 0.3  # of the inner wall or of the floor: with less of it seen the capacity is a guess
 # A step round the foot: so low, faces up within 25°, on so much of the way round.
-STEP_M, LOW_SHARE, LEVEL_COSINE, ROUND_SHARE = (0.0015, 0.025), 0.5, 0.9, 0.6
+STEP_M, LOW_SHARE, LEVEL_COSINE, ROUND_SHARE = (0.0015, 0.06), 0.5, 0.9, 0.6
+# A stem rises from it, as a goblet's from its own foot: so narrow a share of it, at these heights above it.
+STEM_SHARE, STEM_M = 0.3, (0.004, 0.012)
 FLOATS_M = 0.005  # above the table: what a foot's shadow and noise leave open is less
 NO_INSIDE = (
     "its inside was poorly seen: no inside that is open upwards was found; it is dark or shiny, no view looked in, or the object "
@@ -57,14 +59,22 @@ def shares_seen(surface: Surface) -> dict[str, float | None]:
 
 
 def step_m(surface: Surface) -> float | None:
-    """Return the height above the table of what is level all round the foot, as a board or a saucer under it is; or None."""
+    """Return the height above the table of what is level all round the foot, as a board or a saucer under it is; or None.
+
+    A goblet's own foot, from which a stem rises, is none.
+    """
     if not surface.inner.any():
         return None
     x, y, z = surface.vertices_m.T
     low = (z > STEP_M[0]) & (z < min(STEP_M[1], LOW_SHARE * z.max())) & ~surface.inner
     level = low & (vertex_normals(surface.vertices_m, surface.triangles, 1)[:, 2] > LEVEL_COSINE)
     directions = np.unique(np.floor(np.degrees(np.arctan2(y[level], x[level])) / 5))
-    return float(np.median(z[level])) if len(directions) > ROUND_SHARE * 72 else None
+    if len(directions) <= ROUND_SHARE * 72:
+        return None
+    step, out = np.median(z[level]), np.hypot(x, y)
+    above = (z > step + STEM_M[0]) & (z < step + STEM_M[1])
+    has_stem = above.any() and out[above].max() < STEM_SHARE * out[level].max()
+    return None if has_stem else float(step)
 
 
 def complaints(
