@@ -31,7 +31,7 @@ def errors(name: str, towards_deg: float, arc_deg: float) -> tuple[str, str]:
     truth = shape(name)
     true_m3 = trimesh.Trimesh(truth.vertices_m, truth.triangles, process=False).volume
     capacity, solid = [], []
-    for way in (completed, lambda value, *_: value):
+    for way in (completed, lambda *_: None):
         tsdf.completed = way
         surface = tsdf.fuse(views, place, VOXEL_M, TRUNCATION_M, name)
         solid_m3 = trimesh.Trimesh(surface.vertices_m, surface.triangles, process=False).volume

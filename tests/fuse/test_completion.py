@@ -59,7 +59,7 @@ def test_what_was_seen_all_round_stays_as_it_is():
     value[(r > 10) & (r < 14)] = -1.0
     inside = np.repeat((r <= 10)[..., None], 12, axis=2)
     everything = np.ones(value.shape, bool)
-    assert completion.completed(value, everything, inside, VOXEL_M, TRUNCATION_M) is value
+    assert completion.completed(value, everything, inside, VOXEL_M, TRUNCATION_M) is None
 
 
 def test_a_pocket_in_noise_is_no_cavity():
@@ -67,7 +67,7 @@ def test_a_pocket_in_noise_is_no_cavity():
     value[..., 7], pocket[20:30, 20:30, 5:7] = 1.0, True
     value[pocket] = 1.0
     assert pocket.sum() * VOXEL_M**3 < completion.LEAST_M3
-    assert completion.completed(value, seen, pocket, VOXEL_M, TRUNCATION_M) is value
+    assert completion.completed(value, seen, pocket, VOXEL_M, TRUNCATION_M) is None
 
 
 def test_a_foot_wider_than_the_wall_above_it_is_not_in_its_shadow():

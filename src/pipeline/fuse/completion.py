@@ -18,20 +18,22 @@ _LEVEL = _CROSS[..., None]
 
 def completed(
     value: np.ndarray, measured: np.ndarray, walled_in: np.ndarray, voxel_m: float, truncation_m: float
-) -> np.ndarray:
+) -> np.ndarray | None:
     """Return the signed distances (nx, ny, nz) in truncations, positive in the open, with walls in place of what is in shadow.
+
+    None where that is hardly anything.
 
     measured (nx, ny, nz): what some view saw. walled_in: the cavity. Unseen places that are deeper in the body on their level than
     its wall is thick, and can be reached from the cavity, are open; then those that are further from the cavity than that, and can
     be reached from outside, also below the cavity's floor. Nothing that was seen changes.
     """
     if np.count_nonzero(walled_in) * voxel_m**3 < LEAST_M3:
-        return value
+        return None
     inside = ndimage.binary_dilation(walled_in, _LEVEL) & (value <= 0)
     outside = _outer_edge((value <= 0) | walled_in) & walled_in.any(axis=(0, 1))
     shadow_inside = _unseen(inside, measured) > LEAST_UNSEEN
     if not shadow_inside and _unseen(outside, measured) <= LEAST_UNSEEN_OUTSIDE:
-        return value
+        return None
     value, room, truncation = value.copy(), walled_in, truncation_m / voxel_m
     levels = np.flatnonzero(walled_in.any(axis=(0, 1)))
     for z in levels if shadow_inside else ():

@@ -62,10 +62,9 @@ def fuse(views: Views, placement: Placement, voxel_m: float, truncation_m: float
     heights_m = (lowest[2] + np.arange(value.shape[2])) * voxel_m
     value -= np.float32(_excess_m(heights_m, voxel_m) / truncation_m)
     walled_in = enclosed(value > 0)
-    wider = completed(value, measured, walled_in, voxel_m, truncation_m)
-    completing = wider is not value
-    if completing:
-        value, walled_in = wider, enclosed(wider > 0)
+    without_shadow = completed(value, measured, walled_in, voxel_m, truncation_m)
+    if without_shadow is not None:
+        value, walled_in = without_shadow, enclosed(without_shadow > 0)
     floor = _table_layers(voxel_m) - lowest[2]
     table_closed_m2 = float(walled_in[:, :, floor].sum()) * voxel_m**2
     value[:, :, floor][walled_in[:, :, floor]] = -1.0
@@ -77,7 +76,7 @@ def fuse(views: Views, placement: Placement, voxel_m: float, truncation_m: float
     inner = touches(vertices, ~base, walled_in, lowest, voxel_m)
     vertices, weight = refined(vertices, triangles, base, _excess_m(vertices[:, 2], voxel_m), seen_by)
     seen = (weight > LEAST_WEIGHT) & ~base
-    if completing:
+    if without_shadow is not None:
         vertices = evened(vertices, triangles, inner, ~inner & ~base, seen)
     vertices, thickened = parted(vertices, triangles, inner, ~inner & ~base)
     return Surface(vertices, triangles, seen, inner, table_closed_m2, thickened)

@@ -12,10 +12,11 @@ from pathlib import Path
 import yaml
 
 from pipeline.errors import PipelineError
+from pipeline.fuse.layouts import CLOUDS, MESHES
 from pipeline.pour.project import Project
 from pipeline.workflow.objects import NAME, RESERVED
 
-SUFFIXES = (".ply", ".obj", ".stl", ".glb", ".off", ".pcd", ".xyz", ".npz")
+SUFFIXES = MESHES + CLOUDS
 
 
 def options(parser: argparse.ArgumentParser) -> None:
