@@ -17,7 +17,7 @@ from pipeline.geometry.cavity import cavity
 from pipeline.geometry.sampling import uniform_points
 from pipeline.geometry.surface import Surface
 
-LARGEST_M, SMALLEST_M = 2.0, 0.02
+LARGEST_M, SMALLEST_M = 2.0, 0.005
 LARGEST_UNTOLD_M = 0.6  # without `units`: a mesh of unit size is as likely one that was normalised
 LEAST_IN_MM, MOST_IN_CM = 30.0, 60.0  # between them both may be meant
 MORE_WITHOUT = 1.1  # times as much goes in without a part that may be liquid
