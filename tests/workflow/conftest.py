@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from numba.core.caching import UserProvidedCacheLocator
 
 ROOT = Path(__file__).parents[2]
 PARTS = ["Snakefile", "config", "workflow", "profiles", "src"]
@@ -78,7 +79,21 @@ def new_project(folder: Path, source: Path = ROOT) -> Project:
         copy = shutil.copytree if (source / part).is_dir() else shutil.copy2
         copy(source / part, folder / part)
     (folder / "data/raw").mkdir(parents=True)
-    return Project(folder)
+    return _compiled(Project(folder), source)
+
+
+def _compiled(project: Project, source: Path) -> Project:
+    """Return a copy of the project at `source` in which Numba finds what was compiled there; its folders have names by place."""
+    packages = Path("src/pipeline")
+    for old in (project / str(packages)).rglob("numba-*/*_*"):
+        package = packages / old.name.rsplit("_", 1)[0] / "any.py"
+        here, there = (
+            UserProvidedCacheLocator.get_suitable_cache_subpath(root / package)
+            for root in (project.folder, source)
+        )
+        if old.name == there:
+            old.rename(old.with_name(here))
+    return project
 
 
 @pytest.fixture
@@ -115,4 +130,5 @@ def unfinished(finished, tmp_path) -> Project:
 @pytest.fixture
 def project(finished, tmp_path) -> Project:
     """Return a copy of the finished project, with its time stamps."""
-    return Project(shutil.copytree(finished.folder, tmp_path / "project", symlinks=True))
+    copy = Project(shutil.copytree(finished.folder, tmp_path / "project", symlinks=True))
+    return _compiled(copy, finished.folder)
