@@ -144,6 +144,42 @@ def test_the_table_closes_a_ring_without_a_floor():
     assert cup.capacity_m3 == pytest.approx(
         np.pi / 3 * 0.05 * (0.033**2 + 0.033 * 0.036 + 0.036**2), rel=0.04
     )
+    (told,) = coverage.complaints({}, table_closed_m2=surface.table_closed_m2)
+    assert "as low as the table" in told
+
+
+def test_a_colander_is_told_to_have_holes():
+    """It held two litres, and nothing was said."""
+    bowl = thin(60, 80, 60, 2.5, 2.5)
+    places = [(x, y, 0) for x in (-0.03, 0, 0.03) for y in (-0.03, 0, 0.03)]
+    holes = [trimesh.creation.cylinder(0.004, 0.02).apply_translation(place) for place in places]
+    mesh = trimesh.boolean.difference([trimesh.Trimesh(bowl.vertices_m, bowl.triangles), *holes])
+    colander = SimpleNamespace(
+        name="colander", vertices_m=mesh.vertices, triangles=mesh.faces, height_m=bowl.height_m
+    )
+    surface, _ = fused(scenes.views(colander, 24)[0])
+    (told,) = coverage.complaints({}, table_closed_m2=surface.table_closed_m2)
+    assert "colander" in told
+
+
+def test_a_tall_tube_in_the_middle_of_a_tin_keeps_its_top():
+    """Seen from above it is apart from the tin, whose height was its: what was higher was cut off."""
+    tin = [
+        (15, 0),
+        (75, 0),
+        (105, 75),
+        (105, 78),
+        (102, 78),
+        (73, 3),
+        (25, 3),
+        (18.5, 105),
+        (15, 105),
+        (15, 0),
+    ]
+    mesh = trimesh.creation.revolve(1e-3 * np.array(tin), sections=96)
+    body = SimpleNamespace(name="tin", vertices_m=mesh.vertices, triangles=mesh.faces, height_m=0.105)
+    surface, _ = fused(scenes.views(body, 24)[0])
+    assert surface.vertices_m[:, 2].max() == pytest.approx(0.105, abs=0.0015)
 
 
 def test_what_was_not_seen_at_all_is_named():

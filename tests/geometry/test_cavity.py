@@ -71,6 +71,59 @@ def test_a_handle_above_the_rim_is_no_rim(cup: Cavity) -> None:
     assert found.rim_m[:, 2].max() < 0.101
 
 
+@pytest.mark.parametrize("tube_m", [0.085, 0.1])
+def test_the_rim_of_a_cake_tin_is_not_its_tubes(tube_m: float) -> None:
+    """Looked for from the middle, it was the tube's: 15 mm from the axis; a tall tube was told to be a hole in the wall."""
+    tin = [
+        (0.018, 0),
+        (0.095, 0),
+        (0.105, 0.08),
+        (0.102, 0.08),
+        (0.092, 0.003),
+        (0.021, 0.003),
+        (0.021, tube_m),
+        (0.018, tube_m),
+    ]
+    mesh = trimesh.creation.revolve(np.array([*tin, tin[0]]), sections=128)
+    found = cavity(np.asarray(mesh.vertices), np.asarray(mesh.faces), name="tin")
+    truth = np.pi * 0.077 * ((0.092**2 + 0.092 * 0.102 + 0.102**2) / 3 - 0.021**2)
+    assert found.capacity_m3 == pytest.approx(truth, rel=0.01)
+    assert np.hypot(*found.rim_m[:, :2].T) == pytest.approx(0.102, abs=0.001)
+    assert found.rim_m[:, 2] == pytest.approx(0.08, abs=0.0005)
+
+
+@pytest.mark.parametrize("lower_m", [0.003, 0.006])
+def test_a_divided_dish_holds_what_its_compartments_hold(lower_m: float) -> None:
+    """The rim was the divider's, and what one compartment holds the capacity."""
+    size, wall, high = np.array([0.16, 0.12]), 0.003, 0.05
+    outer, inner = (trimesh.creation.box([*xy, high]) for xy in (size, size - 2 * wall))
+    inner.apply_translation([0, 0, wall])
+    divider = trimesh.creation.box(
+        [wall, size[1], high - lower_m], transform(np.eye(3), np.array([0, 0, -lower_m / 2]))
+    )
+    dish = trimesh.boolean.union([outer.difference(inner), divider])
+    dish.apply_translation([0, 0, high / 2])
+    found = cavity(np.asarray(dish.vertices), np.asarray(dish.faces), name="dish")
+    truth = np.prod(size - 2 * wall) * (high - wall) - wall * (size[1] - 2 * wall) * (high - lower_m - wall)
+    assert found.capacity_m3 == pytest.approx(truth, rel=0.02)
+    assert np.abs(found.rim_m[:, 0]).max() == pytest.approx(size[0] / 2 - wall, abs=0.003)
+
+
+def test_a_handle_over_the_opening_is_no_rim(cup: Cavity) -> None:
+    """A bucket's: the rim went up it to the middle, and the wall was told to have a gap."""
+    upright = transform(rotation_about(np.array([1.0, 0.0, 0.0]), np.pi / 2), np.zeros(3))
+    bail = trimesh.creation.torus(RADIUS_M + 0.0015, 0.004, transform=upright)
+    bail.apply_translation([0, 0, 0.1])
+    both = trimesh.boolean.union([trimesh.Trimesh(*cylinder()), bail])
+    inner = trimesh.creation.cylinder(
+        RADIUS_M, DEPTH_M, transform=transform(np.eye(3), np.array([0, 0, 0.003 + DEPTH_M / 2]))
+    )
+    both = both.difference(inner)
+    found = cavity(np.asarray(both.vertices), np.asarray(both.faces), name="bucket")
+    assert found.capacity_m3 == pytest.approx(cup.capacity_m3, rel=0.01)
+    assert found.rim_m[:, 2].max() < 0.102
+
+
 def test_the_wall_is_one_sided(cup: Cavity) -> None:
     x, z = 0.037 + 0.010, 0.05  # beyond a wall of 3 mm, outside the cup
     index = tuple(np.rint((np.array([x, 0.0, z]) - cup.origin_m) / cup.cell_m).astype(int))

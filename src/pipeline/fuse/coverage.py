@@ -18,6 +18,7 @@ STEP_M, LOW_SHARE, LEVEL_COSINE, ROUND_SHARE = (0.0015, 0.06), 0.5, 0.9, 0.6
 # A stem rises from it, as a goblet's from its own foot: so narrow a share of it, at these heights above it.
 STEM_SHARE, STEM_M = 0.3, (0.004, 0.012)
 FLOATS_M = 0.005  # above the table: what a foot's shadow and noise leave open is less
+DRAIN_M2 = 0.0001  # of the table seen through the floor: of the demonstration objects it is none
 NO_INSIDE = (
     "its inside was poorly seen: no inside that is open upwards was found; it is dark or shiny, no view looked in, or the object "
     "has a lid, lies on its side or stands upside down; stand it upright and open, and look from above 60°"
@@ -82,9 +83,10 @@ def complaints(
     thickened_share: float = 0.0,
     lowest_m: float = 0.0,
     stepped_m: float | None = None,
+    table_closed_m2: float = 0.0,
 ) -> list[str]:
-    """Return a sentence for each part that was poorly seen or not at all, a wall that was thickened, a foot that is missing, and a
-    step round the foot."""
+    """Return a sentence for each part that was poorly seen or not at all, a wall that was thickened, a foot that is missing, a
+    step round the foot, and a floor that is the table."""
     inside = [shares.get("inner_wall"), shares.get("floor")]
     told = [NO_INSIDE] if shares and inside == [None, None] else _poor(shares)
     if any(share is not None and share < GUESSED for share in inside):
@@ -103,6 +105,12 @@ def complaints(
         told.append(
             f"something level, {stepped_m * 1e3:.0f} mm above the table, is all round its foot and was fused with it: "
             "if that is a board, a coaster or a saucer, and not its own foot, take it away"
+        )
+    if table_closed_m2 > DRAIN_M2:
+        told.append(
+            f"{1e4 * table_closed_m2:.1f} cm² of its floor are as low as the table, which closes it there: if it has holes, as a "
+            "colander or the tube of a cake tin, it holds less than is found or nothing; if its floor is clear or very thin, "
+            "all is well"
         )
     return told
 

@@ -131,6 +131,11 @@ def complaints(facts: dict[str, Any]) -> list[str]:
             f"a part of the mesh with a level top {1000 * mended['filled_to_m']:.0f} mm above the base is taken for the floor; "
             f"without it {ml[0]:.0f} ml go in instead of {ml[1]:.0f}: if it is liquid, remove it where you made the mesh"
         )
+    if n := mended.get("drains_closed"):
+        told.append(
+            f"{'a hole' if n == 1 else f'{n} holes'} through which liquid would leave, at most {1000 * drains.WIDEST_M:.0f} mm wide, "
+            f"{'was' if n == 1 else 'were'} closed as a scan's; if it has them, as a colander or a flower pot, exclude the object"
+        )
     return told
 
 

@@ -152,7 +152,7 @@ def place(
     cluster = found[0]
     _check_size(cluster, name)
     _check_alone(found, places, middle, frames.inverse(T_table_world), views, name)
-    own = places[cluster.mask]
+    own = places[cluster.mask | _within(found, places)]
     centre = np.array([*cluster.centre_m, 0.0])
     T_object_world = frames.transform(np.eye(3), -centre) @ T_table_world
     placement = Placement(T_object_world, *_region(own - centre), own - centre)
@@ -304,6 +304,22 @@ def _check_alone(
                 f"{name}: expected one object on the table, found two, {first.shown(T_world_table, views)} and "
                 f"{other.shown(T_world_table, views)}; record one at a time"
             )
+
+
+def _within(found: list[Cluster], places: np.ndarray) -> np.ndarray:
+    """Return which of the places (N, 3) stand in the middle of the first of what was found, and higher: a cake tin's tube."""
+    first, taller = found[0], np.zeros(len(places), bool)
+    low = first.bounds_m[0, :2] - CELL_M
+    cells = np.floor((places[:, :2] - low) / CELL_M).astype(int)
+    held = np.zeros(cells[first.mask].max(axis=0) + 2, bool)
+    held[tuple(cells[first.mask].T)] = True
+    held = ndimage.binary_fill_holes(ndimage.binary_closing(held))
+    for other in found[1:]:
+        own = cells[other.mask]
+        inside = ((own >= 0) & (own < held.shape)).all()
+        if other.bounds_m[1, 2] > first.bounds_m[1, 2] and inside and held[tuple(own.T)].all():
+            taller |= other.mask
+    return taller
 
 
 def _apart_m(one: np.ndarray, other: np.ndarray) -> float:

@@ -18,6 +18,8 @@ TIE_M = 0.002  # rims that are level to within this count as level
 _BED = 16  # a spout's bed is looked for in heights averaged over an eighth of the turn: this share to either side
 _RIM_STEP_M = 0.0001
 _RIM_GAP_M = 0.004  # a hole in the scan below the rim's edge may be this high
+# What stands so far above the median of a quarter turn around it is a handle that bridges the opening, as a bucket's.
+_BRIDGE_M = 0.015
 _LEAST_M3 = 5e-6  # a container that keeps less than 5 ml is none
 
 Quadrature = tuple[np.ndarray, np.ndarray, float]
@@ -215,27 +217,57 @@ def _pool(free: np.ndarray, cell: float, name: str) -> tuple[np.ndarray, int]:
 def _rim(
     surface: Surface, axes: list[np.ndarray], pool: np.ndarray, level: int, top_m: float, cell: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the smoothed rim (M, 3) and its mean (3,)."""
+    """Return the smoothed rim (M, 3) and its mean (3,).
+
+    What stands in the middle of the pool, the divider of a dish or the tube of a cake tin, hides the wall from there: it is then
+    followed from above the divider, or from the pool around the tube.
+    """
     ix, iy = np.nonzero(pool[:, :, level])
     centre = np.array([axes[0][ix].mean(), axes[1][iy].mean()])
-    start = max(axes[2][level] - 5 * cell, axes[2][np.nonzero(pool.any(axis=(0, 1)))[0][0]])
-    start = min(start, top_m - cell / 2)  # of a shallow one all cells may be level with its rim
+    bottom = np.nonzero(pool.any(axis=(0, 1)))[0][0]
+    first, lowest_m = max(level - 5, bottom), max(axes[2][level] - 5 * cell, axes[2][bottom])
     for _ in range(3):
-        rim = _rim_about(surface, centre, start, top_m)
+        i, j = np.rint((centre - [axes[0][0], axes[1][0]]) / cell).astype(int)
+        clear = np.flatnonzero(pool[i, j, first : level + 1])
+        start = axes[2][first + clear[0]] if len(clear) and clear[0] > 0 else lowest_m
+        start = min(start, top_m - cell / 2)  # of a shallow one all cells may be level with its rim
+        from_m = 0.0 if len(clear) else _reach(pool[:, :, first], axes, centre, cell)
+        rim = _rim_about(surface, centre, start, top_m, from_m)
         centre = rim[:, :2].mean(axis=0)
     return rim, rim.mean(axis=0)
 
 
-def _rim_about(surface: Surface, centre: np.ndarray, start_m: float, top_m: float) -> np.ndarray:
-    """Follow the wall upwards in every azimuth, as seen from the axis, to its edge; (M, 3)."""
+def _azimuths() -> np.ndarray:
+    return (np.arange(AZIMUTHS) + 0.5) * 2 * np.pi / AZIMUTHS - np.pi
+
+
+def _reach(layer: np.ndarray, axes: list[np.ndarray], centre: np.ndarray, cell: float) -> np.ndarray:
+    """Return how far (M,) from the centre a pool's layer (nx, ny) goes in each azimuth, less two cells."""
+    azimuth = _azimuths()
+    steps = np.arange(0.0, np.hypot(*layer.shape) * cell, cell / 2)
+    out = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=-1)
+    places = centre + steps[:, None] * out[:, None] - [axes[0][0], axes[1][0]]
+    i, j = np.moveaxis(np.rint(places / cell).astype(int), -1, 0)
+    within = (i >= 0) & (i < layer.shape[0]) & (j >= 0) & (j < layer.shape[1])
+    held = within & layer[np.where(within, i, 0), np.where(within, j, 0)]
+    there = held.any(axis=1)
+    reach_m = np.where(held, steps, 0.0).max(axis=1) - 2 * cell
+    return np.interp(azimuth, azimuth[there], np.maximum(reach_m[there], 0.0), period=2 * np.pi)
+
+
+def _rim_about(
+    surface: Surface, centre: np.ndarray, start_m: float, top_m: float, from_m: np.ndarray | float
+) -> np.ndarray:
+    """Follow the wall upwards in every azimuth, as seen from the axis, or from_m (M,) off it, to its edge; (M, 3)."""
     from scipy import ndimage
 
-    azimuth = (np.arange(AZIMUTHS) + 0.5) * 2 * np.pi / AZIMUTHS - np.pi
+    azimuth = _azimuths()
     heights = np.arange(start_m, top_m + _RIM_STEP_M, _RIM_STEP_M)
     origins = np.zeros((AZIMUTHS, len(heights), 3))
-    origins[..., :2], origins[..., 2] = centre, heights
     out = np.stack([np.cos(azimuth), np.sin(azimuth), 0 * azimuth], axis=-1)
-    hits = surface.hit(origins, np.broadcast_to(out[:, None], origins.shape))
+    from_m = np.broadcast_to(from_m, AZIMUTHS)[:, None]
+    origins[..., :2], origins[..., 2] = centre + from_m[..., None] * out[:, None, :2], heights
+    hits = surface.hit(origins, np.broadcast_to(out[:, None], origins.shape)) + from_m
     hits = ndimage.median_filter(np.pad(np.minimum(hits, 10.0), ((2, 2), (0, 0)), mode="wrap"), size=5)[2:-2]
     radius, height = hits[:, 0], np.full(AZIMUTHS, heights[0])
     for k in range(1, len(heights)):
@@ -244,6 +276,12 @@ def _rim_about(surface: Surface, centre: np.ndarray, start_m: float, top_m: floa
             heights[k] - height <= _RIM_GAP_M
         )
         radius, height = np.where(on, hits[:, k], radius), np.where(on, heights[k] + _RIM_STEP_M / 2, height)
+    bridge = height > ndimage.median_filter(height, AZIMUTHS // 4 + 1, mode="wrap") + _BRIDGE_M
+    if bridge.any():
+        near = ndimage.binary_dilation(np.tile(bridge, 3), iterations=3)[AZIMUTHS:-AZIMUTHS]
+        radius, height = (
+            np.interp(azimuth, azimuth[~near], a[~near], period=2 * np.pi) for a in (radius, height)
+        )
     radius, height = (
         ndimage.gaussian_filter1d(ndimage.median_filter(a, 5, mode="wrap"), 2.0, mode="wrap")
         for a in (radius, height)
@@ -277,13 +315,18 @@ def _core(
     x, y, z = np.moveaxis(centres, -1, 0)
     radius, height = _rim_at(rim, opening, x[:, :, 0], y[:, :, 0])
     below = z < height[..., None]
+    under = pool.any(axis=2)
     within = np.hypot(x - opening[0], y - opening[1]) < radius[..., None] - cell
+    within &= (under | ~ndimage.binary_fill_holes(under))[
+        ..., None
+    ]  # a tube that stands in it is no part of it
     for lowered in range(4):
         open_below = free & (z < height[..., None] - lowered * cell)
         labels, count = ndimage.label(open_below)
         found = np.bincount(labels[pool & open_below], minlength=count + 1)
         if found.any() and found.argmax() != labels[0, 0, 0]:
-            core = labels == found.argmax()
+            found[labels[0, 0, 0]] = 0
+            core = found[labels] > 0  # both sides of a divider that is a little lower than the rim
             top = z > height[..., None] - (lowered + 1) * cell
             return core | (free & below & within & top), below
     raise PipelineError(
