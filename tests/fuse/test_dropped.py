@@ -288,6 +288,14 @@ def test_a_sheet_of_liquid_in_a_mesh_is_named(tmp_path):
         dropped(tmp_path / "mug", thin_cup(40, 90, 3), turned((0, 60), (36.9, 60)))
 
 
+def test_holes_that_were_closed_are_told(tmp_path):
+    """A flower pot's hole was closed as a gap of its scan, and nothing was said."""
+    pot = turned((0, 0), (40, 0), (45, 80), (42, 80), (37, 3), (0, 3))
+    hole = trimesh.creation.cylinder(0.003, 0.02)
+    (told,) = dropped(tmp_path, pot.difference(hole)).complaints
+    assert "a hole through which liquid would leave" in told
+
+
 def test_a_floor_made_for_itself_is_no_liquid(tmp_path):
     tube = turned((40, 0), (40, 90), (37, 90), (37, 0), (40, 0))
     result = dropped(tmp_path / "mug", tube, turned((0, 0), (37.5, 0), (37.5, 4), (0, 4)))

@@ -20,6 +20,8 @@ _RIM_STEP_M = 0.0001
 _RIM_GAP_M = 0.004  # a hole in the scan below the rim's edge may be this high
 # What stands so far above the median of a quarter turn around it is a handle that bridges the opening, as a bucket's.
 _BRIDGE_M = 0.015
+# Of the opening's width: what stands in its middle and is narrower is no part of it, but a spoon.
+_LEAST_TUBE = 0.14
 _LEAST_M3 = 5e-6  # a container that keeps less than 5 ml is none
 
 Quadrature = tuple[np.ndarray, np.ndarray, float]
@@ -231,7 +233,8 @@ def _rim(
         clear = np.flatnonzero(pool[i, j, first : level + 1])
         start = axes[2][first + clear[0]] if len(clear) and clear[0] > 0 else lowest_m
         start = min(start, top_m - cell / 2)  # of a shallow one all cells may be level with its rim
-        from_m = 0.0 if len(clear) else _reach(pool[:, :, first], axes, centre, cell)
+        hidden = len(clear) == 0 and _is_wide(pool[:, :, first], i, j)
+        from_m = _reach(pool[:, :, first], axes, centre, cell) if hidden else 0.0
         rim = _rim_about(surface, centre, start, top_m, from_m)
         centre = rim[:, :2].mean(axis=0)
     return rim, rim.mean(axis=0)
@@ -239,6 +242,17 @@ def _rim(
 
 def _azimuths() -> np.ndarray:
     return (np.arange(AZIMUTHS) + 0.5) * 2 * np.pi / AZIMUTHS - np.pi
+
+
+def _is_wide(layer: np.ndarray, i: int, j: int) -> bool:
+    """Return whether what stands at a cell of a pool's layer (nx, ny) is no spoon, but wide, or a part of the wall."""
+    from scipy import ndimage
+
+    labels, _ = ndimage.label(~layer)
+    places = labels == labels[i, j], ndimage.binary_fill_holes(layer)
+    # In cells; those next to a surface are no pool's.
+    stands, across = (2 * np.sqrt(np.count_nonzero(place) / np.pi) for place in places)
+    return bool(stands - 2 > _LEAST_TUBE * (across + 2))
 
 
 def _reach(layer: np.ndarray, axes: list[np.ndarray], centre: np.ndarray, cell: float) -> np.ndarray:
