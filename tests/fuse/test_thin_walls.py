@@ -200,6 +200,20 @@ def test_an_object_without_an_inside_is_named_in_one_sentence():
     assert "lid" in told[0]
 
 
+def test_a_ragged_patch_of_the_inner_wall_is_no_rim():
+    """A leaning vase's unseen wall had edges between inside and outside halfway up: a rim that was poorly seen."""
+    up = np.linspace(0.003, 0.1, 98)
+    profile = [(0, 0), (0.04, 0), (0.04, 0.1), *((0.037, z) for z in up[::-1]), (0, 0.003)]
+    cup = trimesh.creation.revolve(np.array(profile), sections=96)
+    x, y, z = cup.vertices.T
+    inner = (np.hypot(x, y) < 0.038) & (z > 0.002)
+    inner &= ~((x > 0.02) & (z > 0.04) & (z < 0.06))
+    surface = tsdf.Surface(np.array(cup.vertices), np.array(cup.faces), np.ones(len(inner), bool), inner)
+    rim = coverage.parts(surface)["rim"]
+    assert z[rim].min() > 0.09
+    assert rim.any()
+
+
 def test_a_step_all_round_is_a_step_unless_no_inside_was_found():
     surface = on_a_disc(0.03, 0.004)
     assert coverage.step_m(surface) == pytest.approx(0.004)

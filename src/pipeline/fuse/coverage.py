@@ -9,6 +9,7 @@ from pipeline.fuse.tsdf import Surface
 from pipeline.geometry.sampling import triangle_areas_and_normals
 
 RIM_M = 0.004  # from the edge between inside and outside, as everywhere
+BELOW_RIM_M = 0.02  # lower than the highest such edge in its direction: where an unseen wall is ragged, no rim
 FLOOR_COSINE = 0.7  # what faces up within 45° is floor
 MUCH_THICKENED = 0.01  # of the outside: is named
 POOR = 0.8  # a part of which less was seen is named
@@ -33,7 +34,7 @@ def parts(surface: Surface) -> dict[str, np.ndarray]:
     """Return the vertices (V,) of each part; what stands on the table belongs to none. No inside: all is outer wall."""
     above = surface.vertices_m[:, 2] > 0
     inner = surface.inner & above
-    edge = _border(surface.triangles, inner) & above
+    edge = _highest(surface.vertices_m, _border(surface.triangles, inner) & above)
     rim = np.zeros(len(above), bool)
     if edge.any():
         rim = above & np.isfinite(
@@ -128,6 +129,17 @@ def _poor(shares: dict[str, float | None]) -> list[str]:
                 f"the {what} was poorly seen, {share:.0%} of it; the rest is closed by guess: look from more sides, or from higher"
             )
     return told
+
+
+def _highest(vertices: np.ndarray, edge: np.ndarray) -> np.ndarray:
+    """Return which vertices (V,) of the edge are as high as others in their direction from its middle, but for `BELOW_RIM_M`."""
+    if not edge.any():
+        return edge
+    x, y = (vertices[:, :2] - vertices[edge, :2].mean(axis=0)).T
+    direction = np.floor(np.degrees(np.arctan2(y, x)) / 10).astype(int) + 18
+    top = np.full(37, -np.inf)
+    np.maximum.at(top, direction[edge], vertices[edge, 2])
+    return edge & (vertices[:, 2] > top[direction] - BELOW_RIM_M)
 
 
 def _border(triangles: np.ndarray, inner: np.ndarray) -> np.ndarray:
