@@ -124,6 +124,30 @@ def test_a_handle_over_the_opening_is_no_rim(cup: Cavity) -> None:
     assert found.rim_m[:, 2].max() < 0.102
 
 
+def test_a_slit_is_bridged_and_an_opening_like_an_l_is_refused() -> None:
+    """Rays through the slit met nothing, and the rim's middle went out of the grid."""
+    radius, depth = 0.04, 0.057
+    tube = [(0, 0), (radius + 0.003, 0), (radius + 0.003, 0.06), (radius, 0.06), (radius, 0.003), (0, 0.003)]
+    slit = trimesh.creation.box([0.02, 0.02, 0.03], transform(np.eye(3), np.array([radius, 0.0, 0.06])))
+    mesh = trimesh.creation.revolve(np.array(tube), sections=96).difference(slit)
+    found = cavity(np.asarray(mesh.vertices), np.asarray(mesh.faces), name="slit")
+    assert found.capacity_m3 == pytest.approx(np.pi * radius**2 * (depth - 0.015), rel=0.01)
+
+    def bar(long: int, size: tuple[float, float], low: float, wall: float) -> trimesh.Trimesh:
+        extents = np.array([size[1], size[1], 0.04 - low])
+        extents[long] = size[0]
+        at = extents / 2 + [wall, wall, low]
+        return trimesh.creation.box(extents, transform(np.eye(3), at))
+
+    outside, inside = (
+        bar(0, size, low, wall).union(bar(1, size, low, wall))
+        for size, low, wall in (((0.2, 0.05), 0.0, 0.0), ((0.194, 0.044), 0.003, 0.003))
+    )
+    dish = outside.difference(inside)
+    with pytest.raises(PipelineError, match="expected a wall all round the opening, as seen from its middle"):
+        cavity(np.asarray(dish.vertices), np.asarray(dish.faces), name="dish")
+
+
 def test_the_wall_is_one_sided(cup: Cavity) -> None:
     x, z = 0.037 + 0.010, 0.05  # beyond a wall of 3 mm, outside the cup
     index = tuple(np.rint((np.array([x, 0.0, z]) - cup.origin_m) / cup.cell_m).astype(int))

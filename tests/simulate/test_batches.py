@@ -212,9 +212,7 @@ def test_a_cards_machine_code_can_be_made_without_one(monkeypatch, what):
         batches.fill_many(Core(), some_fillings(cup, cup, 3))
     assert ".entry" in made["ptx"]
     assert made["bytes"] > 100_000
-    assert (
-        "sqrt.rn" in made["ptx"]
-    )  # as exact as a core's: the fast mathematics that the functions ask for is not all taken
+    assert "sqrt.rn" in made["ptx"]  # as exact as a core's
 
 
 def test_a_card_agrees_with_the_core(cylinder, bowl):

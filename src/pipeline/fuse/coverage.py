@@ -9,15 +9,17 @@ from pipeline.fuse.tsdf import Surface
 from pipeline.geometry.sampling import triangle_areas_and_normals
 
 RIM_M = 0.004  # from the edge between inside and outside, as everywhere
-BELOW_RIM_M = 0.02  # lower than the highest such edge in its direction: where an unseen wall is ragged, no rim
+BELOW_RIM_M = (
+    0.02  # lower than the highest such edge in its direction: where an unseen wall is ragged, no rim
+)
 FLOOR_COSINE = 0.7  # what faces up within 45° is floor
 MUCH_THICKENED = 0.01  # of the outside: is named
 POOR = 0.8  # a part of which less was seen is named
 GUESSED = 0.3  # of the inner wall or of the floor: with less of it seen the capacity is a guess
 # A step round the foot: so low, faces up within 25°, on so much of the way round.
 STEP_M, LOW_SHARE, LEVEL_COSINE, ROUND_SHARE = (0.0015, 0.06), 0.5, 0.9, 0.6
-# A stem rises from it, as a goblet's from its own foot: so narrow a share of it, at these heights above it.
-STEM_SHARE, STEM_M = 0.3, (0.004, 0.012)
+# A stem rises from it, as a goblet's from its own foot: of so small a radius, and share of it, at these heights above it.
+STEM_RADIUS_M, STEM_SHARE, STEM_M = 0.012, 0.45, (0.004, 0.012)
 FLOATS_M = 0.005  # above the table: what a foot's shadow and noise leave open is less
 DRAIN_M2 = 0.0001  # of the table seen through the floor: of the demonstration objects it is none
 NO_INSIDE = (
@@ -75,7 +77,7 @@ def step_m(surface: Surface) -> float | None:
         return None
     step, out = np.median(z[level]), np.hypot(x, y)
     above = (z > step + STEM_M[0]) & (z < step + STEM_M[1])
-    has_stem = above.any() and out[above].max() < STEM_SHARE * out[level].max()
+    has_stem = above.any() and out[above].max() < min(STEM_RADIUS_M, STEM_SHARE * out[level].max())
     return None if has_stem else float(step)
 
 
@@ -110,8 +112,8 @@ def complaints(
     if table_closed_m2 > DRAIN_M2:
         told.append(
             f"{1e4 * table_closed_m2:.1f} cm² of its floor are as low as the table, which closes it there: if it has holes, as a "
-            "colander or the tube of a cake tin, it holds less than is found or nothing; if its floor is clear or very thin, "
-            "all is well"
+            "colander or the tube of a cake tin, it holds less than is found or nothing; if its floor is clear, less by it; if "
+            "it is very thin, all is well"
         )
     return told
 

@@ -133,8 +133,8 @@ def complaints(facts: dict[str, Any]) -> list[str]:
         )
     if n := mended.get("drains_closed"):
         told.append(
-            f"{'a hole' if n == 1 else f'{n} holes'} through which liquid would leave, at most {1000 * drains.WIDEST_M:.0f} mm wide"
-            f", {'was' if n == 1 else 'were'} closed as a scan's; if it has them, as a colander or a flower pot, exclude the object"
+            f"{'a hole' if n == 1 else f'{n} holes'} through which liquid would leave, about {1000 * drains.WIDEST_M:.0f} mm wide "
+            "at most, taken for gaps of its scan and closed; if they are its own, as a colander's or a flower pot's, exclude it"
         )
     return told
 

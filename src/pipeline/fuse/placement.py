@@ -307,13 +307,13 @@ def _check_alone(
 
 
 def _within(found: list[Cluster], places: np.ndarray) -> np.ndarray:
-    """Return which of the places (N, 3) stand in the middle of the first of what was found, and higher: a cake tin's tube."""
-    first, taller = found[0], np.zeros(len(places), bool)
-    low = first.bounds_m[0, :2] - CELL_M
+    """Return which of the places (N, 3) stand within the outline of the first of what was found, and higher: a cake tin's tube."""
+    first, taller, gap = found[0], np.zeros(len(places), bool), 2
+    low = first.bounds_m[0, :2] - (gap + 1) * CELL_M
     cells = np.floor((places[:, :2] - low) / CELL_M).astype(int)
-    held = np.zeros(cells[first.mask].max(axis=0) + 2, bool)
+    held = np.zeros(cells[first.mask].max(axis=0) + gap + 2, bool)
     held[tuple(cells[first.mask].T)] = True
-    held = ndimage.binary_fill_holes(ndimage.binary_closing(held))
+    held = ndimage.binary_fill_holes(ndimage.binary_closing(held, iterations=gap))
     for other in found[1:]:
         own = cells[other.mask]
         inside = ((own >= 0) & (own < held.shape)).all()

@@ -67,12 +67,13 @@ def _fitted(
 ) -> tuple[list[np.ndarray], bool]:
     """Return the poses fitted to the fused surface, and whether the views' turns are told, by the evidence or by what sticks out.
 
-    A small handle contradicts too few points of a wrong turn; but a surface of revolution lacks it.
+    A small handle contradicts too few points of a wrong turn; but a surface of revolution lacks it. Where there is none of it the
+    turns are as found if hardly anything is off the surface that they make.
     """
     if told >= TOLD:
         return fitted_to_surface(stood, poses, views, name, rng)[0], True
     known = views.options.turntable_deg is not None
-    most = MOST_BEYOND if known else MOST_LEFT * MOST_BEYOND
+    lacking, most = 0.0, MOST_BEYOND if known else MOST_LEFT * MOST_BEYOND
     if not known:
         with suppress(PipelineError):  # a handle that is turned all round may be a second object, or nothing
             turned, surface = fitted_to_surface(stood, _all_round(stood, poses), views, name, rng)
@@ -84,8 +85,9 @@ def _fitted(
         return found, not known
     cure = "correct `turntable_deg:` in scan.yaml" if known else "write `turntable_deg:` into scan.yaml"
     raise PipelineError(
-        f"{name}: expected a round object where turns of the views cannot be told, found {beyond:.1%} of what they show more than "
-        f"{BEYOND_M * 1e3:g} mm off one, as a small handle is, or views that do not fit; add poses, {cure}, or go nearer"
+        f"{name}: expected a round object where turns of the views cannot be told, found {max(lacking, beyond):.1%} of what they "
+        f"show more than {BEYOND_M * 1e3:g} mm off one, as a small handle is, or views that do not fit; add poses, {cure}, or go "
+        "nearer"
     )
 
 

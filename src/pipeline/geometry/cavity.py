@@ -20,6 +20,8 @@ _RIM_STEP_M = 0.0001
 _RIM_GAP_M = 0.004  # a hole in the scan below the rim's edge may be this high
 # What stands so far above the median of a quarter turn around it is a handle that bridges the opening, as a bucket's.
 _BRIDGE_M = 0.015
+_NOWHERE_M = 10.0  # as far as a ray that hits nothing is said to go
+_MOST_SLIT = 0.1  # of the azimuths
 # Of the opening's width: what stands in its middle and is narrower is no part of it, but a spoon.
 _LEAST_TUBE = 0.14
 _LEAST_M3 = 5e-6  # a container that keeps less than 5 ml is none
@@ -68,7 +70,7 @@ def cavity(vertices_m: np.ndarray, triangles: np.ndarray, *, name: str, cell_m: 
     centres = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     free = surface.free_on_grid(centres, cell_m)
     pool, level = _pool(free, cell_m, name)
-    rim, opening = _rim(surface, axes, pool, level, vertices_m[:, 2].max(), cell_m)
+    rim, opening = _rim(surface, axes, pool, level, vertices_m[:, 2].max(), cell_m, name)
     level_m = axes[2][level]
     if rim[:, 2].min() - level_m > 3 * cell_m:
         raise PipelineError(
@@ -217,25 +219,33 @@ def _pool(free: np.ndarray, cell: float, name: str) -> tuple[np.ndarray, int]:
 
 
 def _rim(
-    surface: Surface, axes: list[np.ndarray], pool: np.ndarray, level: int, top_m: float, cell: float
+    surface: Surface,
+    axes: list[np.ndarray],
+    pool: np.ndarray,
+    level: int,
+    top_m: float,
+    cell: float,
+    name: str,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the smoothed rim (M, 3) and its mean (3,).
 
-    What stands in the middle of the pool, the divider of a dish or the tube of a cake tin, hides the wall from there: it is then
-    followed from above the divider, or from the pool around the tube.
+    What stands in the middle of the pool, a divider lower than the rim or the tube of a cake tin, hides the wall from there: it is
+    then followed from above the divider, or from the pool around the tube.
     """
     ix, iy = np.nonzero(pool[:, :, level])
     centre = np.array([axes[0][ix].mean(), axes[1][iy].mean()])
     bottom = np.nonzero(pool.any(axis=(0, 1)))[0][0]
     first, lowest_m = max(level - 5, bottom), max(axes[2][level] - 5 * cell, axes[2][bottom])
     for _ in range(3):
-        i, j = np.rint((centre - [axes[0][0], axes[1][0]]) / cell).astype(int)
+        i, j = np.clip(
+            np.rint((centre - [axes[0][0], axes[1][0]]) / cell).astype(int), 0, np.array(pool.shape[:2]) - 1
+        )
         clear = np.flatnonzero(pool[i, j, first : level + 1])
         start = axes[2][first + clear[0]] if len(clear) and clear[0] > 0 else lowest_m
         start = min(start, top_m - cell / 2)  # of a shallow one all cells may be level with its rim
         hidden = len(clear) == 0 and _is_wide(pool[:, :, first], i, j)
         from_m = _reach(pool[:, :, first], axes, centre, cell) if hidden else 0.0
-        rim = _rim_about(surface, centre, start, top_m, from_m)
+        rim = _rim_about(surface, centre, start, top_m, from_m, name)
         centre = rim[:, :2].mean(axis=0)
     return rim, rim.mean(axis=0)
 
@@ -270,9 +280,17 @@ def _reach(layer: np.ndarray, axes: list[np.ndarray], centre: np.ndarray, cell: 
 
 
 def _rim_about(
-    surface: Surface, centre: np.ndarray, start_m: float, top_m: float, from_m: np.ndarray | float
+    surface: Surface,
+    centre: np.ndarray,
+    start_m: float,
+    top_m: float,
+    from_m: np.ndarray | float,
+    name: str,
 ) -> np.ndarray:
-    """Follow the wall upwards in every azimuth, as seen from the axis, or from_m (M,) off it, to its edge; (M, 3)."""
+    """Follow the wall upwards in every azimuth, as seen from the axis, or from_m (M,) off it, to its edge; (M, 3).
+
+    Over a slit, and where a handle bridges the opening, it goes from one side to the other.
+    """
     from scipy import ndimage
 
     azimuth = _azimuths()
@@ -282,7 +300,9 @@ def _rim_about(
     from_m = np.broadcast_to(from_m, AZIMUTHS)[:, None]
     origins[..., :2], origins[..., 2] = centre + from_m[..., None] * out[:, None, :2], heights
     hits = surface.hit(origins, np.broadcast_to(out[:, None], origins.shape)) + from_m
-    hits = ndimage.median_filter(np.pad(np.minimum(hits, 10.0), ((2, 2), (0, 0)), mode="wrap"), size=5)[2:-2]
+    hits = ndimage.median_filter(np.pad(np.minimum(hits, _NOWHERE_M), ((2, 2), (0, 0)), mode="wrap"), size=5)[
+        2:-2
+    ]
     radius, height = hits[:, 0], np.full(AZIMUTHS, heights[0])
     for k in range(1, len(heights)):
         # A step outwards is something else behind the wall: a handle that rises above the rim.
@@ -290,9 +310,15 @@ def _rim_about(
             heights[k] - height <= _RIM_GAP_M
         )
         radius, height = np.where(on, hits[:, k], radius), np.where(on, heights[k] + _RIM_STEP_M / 2, height)
-    bridge = height > ndimage.median_filter(height, AZIMUTHS // 4 + 1, mode="wrap") + _BRIDGE_M
-    if bridge.any():
-        near = ndimage.binary_dilation(np.tile(bridge, 3), iterations=3)[AZIMUTHS:-AZIMUTHS]
+    slit = radius >= _NOWHERE_M
+    if slit.mean() > _MOST_SLIT:
+        raise PipelineError(
+            f"{name}: expected a wall all round the opening, as seen from its middle, found none in {360 * slit.mean():.0f} of "
+            "360° (a slit, or an opening like an L or a U); mend the scan or put the object in objects.exclude"
+        )
+    left_out = slit | (height > ndimage.median_filter(height, AZIMUTHS // 4 + 1, mode="wrap") + _BRIDGE_M)
+    near = ndimage.binary_dilation(np.tile(left_out, 3), iterations=3)[AZIMUTHS:-AZIMUTHS]
+    if left_out.any() and not near.all():
         radius, height = (
             np.interp(azimuth, azimuth[~near], a[~near], period=2 * np.pi) for a in (radius, height)
         )
@@ -331,9 +357,8 @@ def _core(
     below = z < height[..., None]
     under = pool.any(axis=2)
     within = np.hypot(x - opening[0], y - opening[1]) < radius[..., None] - cell
-    within &= (under | ~ndimage.binary_fill_holes(under))[
-        ..., None
-    ]  # a tube that stands in it is no part of it
+    tube = ndimage.binary_fill_holes(under) & ~under
+    within &= ~tube[..., None]
     for lowered in range(4):
         open_below = free & (z < height[..., None] - lowered * cell)
         labels, count = ndimage.label(open_below)

@@ -66,7 +66,8 @@ def ablation_numbers(tables: Tables) -> dict[str, float]:
             if variant != "default" and default is not None:
                 difference = found - default
                 numbers |= with_interval(f"{head}.minus_default", difference)
-                numbers[f"{head}.minus_default.p"] = two_sided_p(difference)
+                if f"{head}.minus_default" in numbers:
+                    numbers[f"{head}.minus_default.p"] = two_sided_p(difference)
     return numbers
 
 

@@ -48,7 +48,9 @@ def score_numbers(values: Mapping[str, np.ndarray]) -> Numbers:
             if features == better and other in values:
                 head = f"evaluation.{experiment}.{better}_minus_{worse}.{split}.{measure}"
                 difference = values[name] - values[other]
-                numbers |= {**with_interval(head, difference), f"{head}.p": two_sided_p(difference)}
+                numbers |= with_interval(head, difference)
+                if head in numbers:
+                    numbers[f"{head}.p"] = two_sided_p(difference)
     return numbers
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import numba
 from numba import njit
 
-# Sums keep their order and products their rounding, so the bits are the same on every processor; with "reassoc" and "contract",
+# Sums keep their order and products their rounding, so the bits are those of every other processor; with "reassoc" and "contract",
 # which are 3 % faster, a few particles run over elsewhere. NaN must stay NaN: it marks a failed trial.
 _FAST = {"nsz"}
 

@@ -1,7 +1,7 @@
 """A graphics card with a thread for each trial: the only importer of numba-cuda, which compiles the liquid's functions for it.
 
-Those functions ask for some fast mathematics. Of that numba-cuda takes approximate division alone: not a number stays not a
-number, as a failed trial needs it.
+Those functions ask for no fast mathematics but that zeros have no sign: not a number stays not a number, as a failed trial
+needs it.
 """
 
 import math

@@ -143,8 +143,8 @@ def _topped(vessel: Vessel) -> list[np.ndarray]:
     def chain() -> list[np.ndarray]:
         target = particles_for(vessel, vessel.cavity.capacity_m3)
         n = max(int(_TOP_UP_FROM * target), min(target, 8))
-        while len(_settled(vessel, n)) < n:  # it splashed over
-            n = len(vessel.settled[n]) - 1
+        while n > 1 and len(_settled(vessel, n)) < n:  # it splashed over
+            n = max(len(vessel.settled[n]) - 1, 1)
         states = [_calmed(vessel, _topped_up(vessel, vessel.settled[n], 0), _CALM_S, SETTLE_DAMPING)]
         for turn in range(1, _TOP_UPS):
             left = max(len(states[-1]) - _scaled(target, _ROOMS[(turn - 1) % len(_ROOMS)]), 1)
@@ -170,6 +170,8 @@ def _lowest(at_rest: np.ndarray, n: int) -> np.ndarray:
 
 def _topped_up(vessel: Vessel, start: np.ndarray, turn: int) -> np.ndarray:
     """Set particles down on the liquid, without speed, a few at a time, until one runs over; the state before (m, 3).
+
+    Where some run over before any was set down, what then is left.
 
     They come down on a golden spiral over the inner part of the opening; `turn` says where on it the first one does.
     """
