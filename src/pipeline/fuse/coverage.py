@@ -9,9 +9,8 @@ from pipeline.fuse.tsdf import Surface
 from pipeline.geometry.sampling import triangle_areas_and_normals
 
 RIM_M = 0.004  # from the edge between inside and outside, as everywhere
-BELOW_RIM_M = (
-    0.02  # lower than the highest such edge in its direction: where an unseen wall is ragged, no rim
-)
+# Such an edge so far below the highest in its direction is no rim, but where an unseen wall is ragged.
+BELOW_RIM_M = 0.02
 FLOOR_COSINE = 0.7  # what faces up within 45° is floor
 MUCH_THICKENED = 0.01  # of the outside: is named
 POOR = 0.8  # a part of which less was seen is named

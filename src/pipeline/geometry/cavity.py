@@ -11,19 +11,11 @@ import numpy as np
 
 from pipeline.errors import PipelineError
 from pipeline.geometry.frames import apply, rotation_about
+from pipeline.geometry.rim import rim_and_opening, rim_at
 from pipeline.geometry.surface import Surface, subdivided
 
-AZIMUTHS = 256
 TIE_M = 0.002  # rims that are level to within this count as level
 _BED = 16  # a spout's bed is looked for in heights averaged over an eighth of the turn: this share to either side
-_RIM_STEP_M = 0.0001
-_RIM_GAP_M = 0.004  # a hole in the scan below the rim's edge may be this high
-# What stands so far above the median of a quarter turn around it is a handle that bridges the opening, as a bucket's.
-_BRIDGE_M = 0.015
-_NOWHERE_M = 10.0  # as far as a ray that hits nothing is said to go
-_MOST_SLIT = 0.1  # of the azimuths
-# Of the opening's width: what stands in its middle and is narrower is no part of it, but a spoon.
-_LEAST_TUBE = 0.14
 _LEAST_M3 = 5e-6  # a container that keeps less than 5 ml is none
 
 Quadrature = tuple[np.ndarray, np.ndarray, float]
@@ -54,7 +46,7 @@ class Cavity:
 
     def rim_at(self, x_m: np.ndarray, y_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the rim's horizontal distance from the opening and its height in the direction of (x, y)."""
-        return _rim_at(self.rim_m, self.opening_m, x_m, y_m)
+        return rim_at(self.rim_m, self.opening_m, x_m, y_m)
 
 
 def cavity(vertices_m: np.ndarray, triangles: np.ndarray, *, name: str, cell_m: float = 0.002) -> Cavity:
@@ -70,7 +62,7 @@ def cavity(vertices_m: np.ndarray, triangles: np.ndarray, *, name: str, cell_m: 
     centres = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     free = surface.free_on_grid(centres, cell_m)
     pool, level = _pool(free, cell_m, name)
-    rim, opening = _rim(surface, axes, pool, level, vertices_m[:, 2].max(), cell_m, name)
+    rim, opening = rim_and_opening(surface, axes, pool, level, vertices_m[:, 2].max(), cell_m, name)
     level_m = axes[2][level]
     if rim[:, 2].min() - level_m > 3 * cell_m:
         raise PipelineError(
@@ -183,7 +175,7 @@ def _room(
 ) -> np.ndarray:
     """Return the share of each cell that is room; half-open cells at wall and rim make it better than the grid."""
     x, y, z = xyz
-    radius, height = (a[..., None] for a in _rim_at(rim, opening, x[..., 0], y[..., 0]))
+    radius, height = (a[..., None] for a in rim_at(rim, opening, x[..., 0], y[..., 0]))
     wall = np.where(interior | ((np.abs(distance) < cell) & (z < height)), _share_below(distance, cell), 0.0)
     rim_layer = (z >= height) & (z < height + cell / 2)
     edge = _share_below(radius - np.hypot(x - opening[0], y - opening[1]), cell)
@@ -218,128 +210,6 @@ def _pool(free: np.ndarray, cell: float, name: str) -> tuple[np.ndarray, int]:
     )
 
 
-def _rim(
-    surface: Surface,
-    axes: list[np.ndarray],
-    pool: np.ndarray,
-    level: int,
-    top_m: float,
-    cell: float,
-    name: str,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the smoothed rim (M, 3) and its mean (3,).
-
-    What stands in the middle of the pool, a divider lower than the rim or the tube of a cake tin, hides the wall from there: it is
-    then followed from above the divider, or from the pool around the tube.
-    """
-    ix, iy = np.nonzero(pool[:, :, level])
-    centre = np.array([axes[0][ix].mean(), axes[1][iy].mean()])
-    bottom = np.nonzero(pool.any(axis=(0, 1)))[0][0]
-    first, lowest_m = max(level - 5, bottom), max(axes[2][level] - 5 * cell, axes[2][bottom])
-    for _ in range(3):
-        i, j = np.clip(
-            np.rint((centre - [axes[0][0], axes[1][0]]) / cell).astype(int), 0, np.array(pool.shape[:2]) - 1
-        )
-        clear = np.flatnonzero(pool[i, j, first : level + 1])
-        start = axes[2][first + clear[0]] if len(clear) and clear[0] > 0 else lowest_m
-        start = min(start, top_m - cell / 2)  # of a shallow one all cells may be level with its rim
-        hidden = len(clear) == 0 and _is_wide(pool[:, :, first], i, j)
-        from_m = _reach(pool[:, :, first], axes, centre, cell) if hidden else 0.0
-        rim = _rim_about(surface, centre, start, top_m, from_m, name)
-        centre = rim[:, :2].mean(axis=0)
-    return rim, rim.mean(axis=0)
-
-
-def _azimuths() -> np.ndarray:
-    return (np.arange(AZIMUTHS) + 0.5) * 2 * np.pi / AZIMUTHS - np.pi
-
-
-def _is_wide(layer: np.ndarray, i: int, j: int) -> bool:
-    """Return whether what stands at a cell of a pool's layer (nx, ny) is no spoon, but wide, or a part of the wall."""
-    from scipy import ndimage
-
-    labels, _ = ndimage.label(~layer)
-    places = labels == labels[i, j], ndimage.binary_fill_holes(layer)
-    # In cells; those next to a surface are no pool's.
-    stands, across = (2 * np.sqrt(np.count_nonzero(place) / np.pi) for place in places)
-    return bool(stands - 2 > _LEAST_TUBE * (across + 2))
-
-
-def _reach(layer: np.ndarray, axes: list[np.ndarray], centre: np.ndarray, cell: float) -> np.ndarray:
-    """Return how far (M,) from the centre a pool's layer (nx, ny) goes in each azimuth, less two cells."""
-    azimuth = _azimuths()
-    steps = np.arange(0.0, np.hypot(*layer.shape) * cell, cell / 2)
-    out = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=-1)
-    places = centre + steps[:, None] * out[:, None] - [axes[0][0], axes[1][0]]
-    i, j = np.moveaxis(np.rint(places / cell).astype(int), -1, 0)
-    within = (i >= 0) & (i < layer.shape[0]) & (j >= 0) & (j < layer.shape[1])
-    held = within & layer[np.where(within, i, 0), np.where(within, j, 0)]
-    there = held.any(axis=1)
-    reach_m = np.where(held, steps, 0.0).max(axis=1) - 2 * cell
-    return np.interp(azimuth, azimuth[there], np.maximum(reach_m[there], 0.0), period=2 * np.pi)
-
-
-def _rim_about(
-    surface: Surface,
-    centre: np.ndarray,
-    start_m: float,
-    top_m: float,
-    from_m: np.ndarray | float,
-    name: str,
-) -> np.ndarray:
-    """Follow the wall upwards in every azimuth, as seen from the axis, or from_m (M,) off it, to its edge; (M, 3).
-
-    Over a slit, and where a handle bridges the opening, it goes from one side to the other.
-    """
-    from scipy import ndimage
-
-    azimuth = _azimuths()
-    heights = np.arange(start_m, top_m + _RIM_STEP_M, _RIM_STEP_M)
-    origins = np.zeros((AZIMUTHS, len(heights), 3))
-    out = np.stack([np.cos(azimuth), np.sin(azimuth), 0 * azimuth], axis=-1)
-    from_m = np.broadcast_to(from_m, AZIMUTHS)[:, None]
-    origins[..., :2], origins[..., 2] = centre + from_m[..., None] * out[:, None, :2], heights
-    hits = surface.hit(origins, np.broadcast_to(out[:, None], origins.shape)) + from_m
-    hits = ndimage.median_filter(np.pad(np.minimum(hits, _NOWHERE_M), ((2, 2), (0, 0)), mode="wrap"), size=5)[
-        2:-2
-    ]
-    radius, height = hits[:, 0], np.full(AZIMUTHS, heights[0])
-    for k in range(1, len(heights)):
-        # A step outwards is something else behind the wall: a handle that rises above the rim.
-        on = (np.abs(hits[:, k] - radius) < np.maximum(0.010, 0.35 * radius)) & (
-            heights[k] - height <= _RIM_GAP_M
-        )
-        radius, height = np.where(on, hits[:, k], radius), np.where(on, heights[k] + _RIM_STEP_M / 2, height)
-    slit = radius >= _NOWHERE_M
-    if slit.mean() > _MOST_SLIT:
-        raise PipelineError(
-            f"{name}: expected a wall all round the opening, as seen from its middle, found none in {360 * slit.mean():.0f} of "
-            "360° (a slit, or an opening like an L or a U); mend the scan or put the object in objects.exclude"
-        )
-    left_out = slit | (height > ndimage.median_filter(height, AZIMUTHS // 4 + 1, mode="wrap") + _BRIDGE_M)
-    near = ndimage.binary_dilation(np.tile(left_out, 3), iterations=3)[AZIMUTHS:-AZIMUTHS]
-    if left_out.any() and not near.all():
-        radius, height = (
-            np.interp(azimuth, azimuth[~near], a[~near], period=2 * np.pi) for a in (radius, height)
-        )
-    radius, height = (
-        ndimage.gaussian_filter1d(ndimage.median_filter(a, 5, mode="wrap"), 2.0, mode="wrap")
-        for a in (radius, height)
-    )
-    return np.column_stack([centre + radius[:, None] * out[:, :2], height])
-
-
-def _rim_at(
-    rim: np.ndarray, opening: np.ndarray, x: np.ndarray, y: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    offset = rim[:, :2] - opening[:2]
-    azimuth = np.arctan2(offset[:, 1], offset[:, 0])
-    order = np.argsort(azimuth)
-    wanted = np.arctan2(y - opening[1], x - opening[0])
-    radius = np.interp(wanted, azimuth[order], np.hypot(*offset[order].T), period=2 * np.pi)
-    return radius, np.interp(wanted, azimuth[order], rim[order, 2], period=2 * np.pi)
-
-
 def _core(
     free: np.ndarray,
     pool: np.ndarray,
@@ -353,7 +223,7 @@ def _core(
     from scipy import ndimage
 
     x, y, z = np.moveaxis(centres, -1, 0)
-    radius, height = _rim_at(rim, opening, x[:, :, 0], y[:, :, 0])
+    radius, height = rim_at(rim, opening, x[:, :, 0], y[:, :, 0])
     below = z < height[..., None]
     under = pool.any(axis=2)
     within = np.hypot(x - opening[0], y - opening[1]) < radius[..., None] - cell

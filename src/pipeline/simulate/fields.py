@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.geometry.cavity import AZIMUTHS, Cavity
+from pipeline.geometry.cavity import Cavity
+from pipeline.geometry.rim import AZIMUTHS
 
 SUPPORT = 2.0  # support radius of the kernel, spacings: about 32 neighbours
 FIELD_CELL = 0.3  # cell of the precomputed wall, spacings: 3 mm at 10 mm

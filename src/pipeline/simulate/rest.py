@@ -34,7 +34,7 @@ _RUNS, _RUNS_OF_MANY, _MANY = (
 )  # top-ups of a trial's liquid; fewer where a vessel holds many, as one counts for less
 # A mean of one top-up a room that is further from the capacity tells enough: a share of it, and particles.
 _FAR, _FAR_AT_LEAST = 0.015, 4
-_FOR_GOOD = 0.01  # of the capacity
+_FOR_GOOD = 0.01  # of the capacity: so much of it may run over sooner or later
 _TOP_UPS, _STATES = 8, 5  # in a row; the last ones are kept
 _PORTIONS = 300  # a portion set down at once is this part of the capacity, one particle at least
 _PORTION_S = 0.1
@@ -145,11 +145,11 @@ def _topped(vessel: Vessel) -> list[np.ndarray]:
         n = max(int(_TOP_UP_FROM * target), min(target, 8))
         while n > 1 and len(_settled(vessel, n)) < n:  # it splashed over
             n = max(len(vessel.settled[n]) - 1, 1)
-        states = [_calmed(vessel, _topped_up(vessel, vessel.settled[n], 0), _CALM_S, SETTLE_DAMPING)]
-        for turn in range(1, _TOP_UPS):
-            left = max(len(states[-1]) - _scaled(target, _ROOMS[(turn - 1) % len(_ROOMS)]), 1)
-            topped = _topped_up(vessel, _lowest(states[-1], left), turn)
-            states.append(_calmed(vessel, topped, _CALM_S, SETTLE_DAMPING))
+        start, states = _settled(vessel, n), []
+        for turn in range(_TOP_UPS):
+            states.append(_calmed(vessel, _topped_up(vessel, start, turn), _CALM_S, SETTLE_DAMPING))
+            left = len(states[-1]) - _scaled(target, _ROOMS[turn % len(_ROOMS)])
+            start = _lowest(states[-1], max(left, 1))
         ordered = sorted(states[-_STATES:], key=len)
         return [ordered.pop(_STATES // 2), *ordered]
 
