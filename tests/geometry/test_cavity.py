@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 import trimesh
@@ -92,9 +94,9 @@ def test_the_rim_of_a_cake_tin_is_not_its_tubes(tube_m: float) -> None:
     assert found.rim_m[:, 2] == pytest.approx(0.08, abs=0.0005)
 
 
-@pytest.mark.parametrize("lower_m", [0.003, 0.006])
-def test_a_divided_dish_holds_what_its_compartments_hold(lower_m: float) -> None:
-    """The rim was the divider's, and what one compartment holds the capacity."""
+@pytest.mark.parametrize(("lower_m", "chip_m"), [(0.003, 0.0), (0.006, 0.0), (0.0, 0.0), (0.0, 0.005)])
+def test_a_divided_dish_holds_what_its_compartments_hold(lower_m: float, chip_m: float) -> None:
+    """The rim was the divider's, and what one compartment holds the capacity; with a chip in the other's edge, too."""
     size, wall, high = np.array([0.16, 0.12]), 0.003, 0.05
     outer, inner = (trimesh.creation.box([*xy, high]) for xy in (size, size - 2 * wall))
     inner.apply_translation([0, 0, wall])
@@ -102,11 +104,27 @@ def test_a_divided_dish_holds_what_its_compartments_hold(lower_m: float) -> None
         [wall, size[1], high - lower_m], transform(np.eye(3), np.array([0, 0, -lower_m / 2]))
     )
     dish = trimesh.boolean.union([outer.difference(inner), divider])
+    if chip_m:
+        chip = trimesh.creation.box([0.02, 0.02, 2 * chip_m])
+        dish = dish.difference(chip.apply_translation([size[0] / 2, 0, high / 2]))
     dish.apply_translation([0, 0, high / 2])
     found = cavity(np.asarray(dish.vertices), np.asarray(dish.faces), name="dish")
-    truth = np.prod(size - 2 * wall) * (high - wall) - wall * (size[1] - 2 * wall) * (high - lower_m - wall)
+    divided = wall * (size[1] - 2 * wall) * (high - max(lower_m, chip_m) - wall)
+    truth = np.prod(size - 2 * wall) * (high - chip_m - wall) - divided
     assert found.capacity_m3 == pytest.approx(truth, rel=0.02)
     assert np.abs(found.rim_m[:, 0]).max() == pytest.approx(size[0] / 2 - wall, abs=0.003)
+
+
+def test_all_cups_of_a_muffin_tin_count() -> None:
+    """One of them did."""
+    radius, depth = 0.03, 0.03
+    tin = trimesh.creation.box(bounds=[[-0.12, -0.08, 0], [0.12, 0.08, 0.035]])
+    for x, y in itertools.product((-0.075, 0.0, 0.075), (-0.037, 0.037)):
+        cup = trimesh.creation.cylinder(radius, 0.04, sections=96)
+        tin = tin.difference(cup.apply_translation([x, y, 0.025]))
+    found = cavity(np.asarray(tin.vertices), np.asarray(tin.faces), name="tin")
+    assert found.capacity_m3 == pytest.approx(6 * np.pi * radius**2 * depth, rel=0.01)
+    assert found.opening_m == pytest.approx([0, 0, 0.035], abs=0.002)
 
 
 def test_a_handle_over_the_opening_is_no_rim(cup: Cavity) -> None:

@@ -16,6 +16,7 @@ from pipeline.geometry.surface import Surface, subdivided
 
 TIE_M = 0.002  # rims that are level to within this count as level
 _BED = 16  # a spout's bed is looked for in heights averaged over an eighth of the turn: this share to either side
+_LOWER = 3  # cells: a room that overflows so much lower than another is one of the same container
 _LEAST_M3 = 5e-6  # a container that keeps less than 5 ml is none
 
 Quadrature = tuple[np.ndarray, np.ndarray, float]
@@ -189,21 +190,27 @@ def _axes(vertices: np.ndarray, cell: float) -> list[np.ndarray]:
 
 
 def _pool(free: np.ndarray, cell: float, name: str) -> tuple[np.ndarray, int]:
-    """Return the largest room that the object encloses below some level, and that level's layer: the highest such."""
+    """Return the rooms that the object encloses below some level, and that level's layer: the highest such.
+
+    Rooms that overflow a little lower count as well: a divider that is as high as the rim makes two of one.
+    """
     from scipy import ndimage
 
     labels, _ = ndimage.label(free)
     air = labels == labels[0, 0, 0]
-    largest = 0
+    pool, level, largest = np.zeros_like(free), 0, 0
     for layer in range(free.shape[2] - 1, 0, -1):
         labels, count = ndimage.label(air[:, :, : layer + 1])
         sizes = np.bincount(labels.ravel(), minlength=count + 1)
         sizes[[0, labels[0, 0, 0]]] = 0
         largest = max(largest, int(sizes.max()))
-        if sizes.max() * cell**3 >= _LEAST_M3:
-            pool = np.zeros_like(free)
-            pool[:, :, : layer + 1] = labels == sizes.argmax()
-            return pool, layer
+        holds = sizes * cell**3 >= _LEAST_M3
+        level = level or layer * bool(holds.any())
+        pool[:, :, : layer + 1] |= holds[labels]
+        if layer == level - _LOWER:
+            break
+    if level:
+        return pool, level
     raise PipelineError(
         f"{name}: expected an object that holds liquid, found room for {largest * cell**3 * 1e6:.1f} ml at any level "
         "(a plate, a closed block, or a hole in its floor); mend the scan or put the object in objects.exclude"

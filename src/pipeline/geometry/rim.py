@@ -14,6 +14,7 @@ _NOWHERE_M = 10.0  # as far as a ray that hits nothing is said to go
 _MOST_SLIT = 0.1  # of the azimuths
 # Of the opening's width: what stands in its middle and is narrower is no part of it, but a spoon.
 _LEAST_TUBE = 0.14
+_MOST_OUTSIDE = 0.05  # of a pool may be outside of its rim
 
 
 def rim_and_opening(
@@ -27,13 +28,13 @@ def rim_and_opening(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the smoothed rim (M, 3) of a pool (nx, ny, nz), whose highest layer is `level`, and the rim's mean (3,).
 
-    What stands in the middle of the pool, a divider lower than the rim or the tube of a cake tin, hides the wall from there: it is
-    then followed from above the divider, or from the pool around the tube.
+    What stands in the middle of the pool, a divider or the tube of a cake tin, hides the wall from there: it is then followed from
+    above a divider that is lower than the rim, or from the pool around what stands there, as where dividers leave rooms outside.
     """
-    ix, iy = np.nonzero(pool[:, :, level])
-    centre = np.array([axes[0][ix].mean(), axes[1][iy].mean()])
+    centre = _middle(pool[:, :, level], axes)
     bottom = np.nonzero(pool.any(axis=(0, 1)))[0][0]
     first, lowest_m = max(level - 5, bottom), max(axes[2][level] - 5 * cell, axes[2][bottom])
+    is_divided = False
     for _ in range(3):
         i, j = np.clip(
             np.rint((centre - [axes[0][0], axes[1][0]]) / cell).astype(int), 0, np.array(pool.shape[:2]) - 1
@@ -41,11 +42,26 @@ def rim_and_opening(
         clear = np.flatnonzero(pool[i, j, first : level + 1])
         start = axes[2][first + clear[0]] if len(clear) and clear[0] > 0 else lowest_m
         start = min(start, top_m - cell / 2)  # of a shallow one all cells may be level with its rim
-        hidden = len(clear) == 0 and _is_wide(pool[:, :, first], i, j)
+        hidden = is_divided or (len(clear) == 0 and _is_wide(pool[:, :, first], i, j))
         from_m = _reach(pool[:, :, first], axes, centre, cell) if hidden else 0.0
         rim = _rim_about(surface, centre, start, top_m, from_m, name)
-        centre = rim[:, :2].mean(axis=0)
+        is_divided = is_divided or _share_outside(pool[:, :, first], axes, rim, cell) > _MOST_OUTSIDE
+        centre = _middle(pool[:, :, first], axes) if is_divided else rim[:, :2].mean(axis=0)
     return rim, rim.mean(axis=0)
+
+
+def _middle(layer: np.ndarray, axes: list[np.ndarray]) -> np.ndarray:
+    """Return the mean place (2,) of a pool's layer (nx, ny)."""
+    ix, iy = np.nonzero(layer)
+    return np.array([axes[0][ix].mean(), axes[1][iy].mean()])
+
+
+def _share_outside(layer: np.ndarray, axes: list[np.ndarray], rim: np.ndarray, cell: float) -> float:
+    """Return the share of a pool's layer (nx, ny) that is outside of a rim (M, 3)."""
+    x, y = (axis[index] for axis, index in zip(axes[:2], np.nonzero(layer), strict=True))
+    opening = rim.mean(axis=0)
+    radius, _ = rim_at(rim, opening, x, y)
+    return float(np.mean(np.hypot(x - opening[0], y - opening[1]) > radius + 2 * cell))
 
 
 def _azimuths() -> np.ndarray:
