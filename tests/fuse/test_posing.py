@@ -42,7 +42,7 @@ def test_poses_of_a_shaky_arm_are_refined(scan, name):
 
 def test_views_of_a_round_object_by_a_camera_that_is_askew_are_refined_and_keep_their_turns():
     """As by a wrong hand-eye calibration: they turned about the object's axis by up to 60°, and all stayed as given."""
-    given, T_world_object = scenes.views(shape("small_cup"), 18)
+    given, _ = scenes.views(shape("small_cup"), 18)
     askew = frames.transform(Rotation.from_rotvec([0.007, -0.005, 0.003]).as_matrix(), np.full(3, 0.0017))
     found = located(replace(given, T_world_cameras=[T @ askew for T in given.T_world_cameras]))
     assert found.facts()["poses"] == "refined"

@@ -129,9 +129,7 @@ def _misfit(view: Levelled, T: np.ndarray, tree: cKDTree) -> float:
     return float(np.mean(np.minimum(distance / CAP_M, 1.0) ** 2))
 
 
-def _icp(
-    view: Levelled, T: np.ndarray, tree: cKDTree, iterations: int, hold_turn: float = 0.0
-) -> np.ndarray:
+def _icp(view: Levelled, T: np.ndarray, tree: cKDTree, iterations: int, hold_turn: float = 0.0) -> np.ndarray:
     """Return T after steps towards the nearest features of the model; hold_turn: how much, a point, its turn is held to none."""
     for _ in range(iterations):
         features = view.features(T)
@@ -151,8 +149,8 @@ def _icp(
 def _turned_by_colour(view: Levelled, T: np.ndarray, tree: cKDTree) -> np.ndarray:
     """Return T turned about the view's axis to where its colours fit best: planes of a round object do not tell turns."""
     cost = _misfit(view, T, tree)
-    for turn_rad in TURNS_BY_COLOUR_RAD:
-        for turned in (T @ _turn(turn_rad), T @ _turn(-turn_rad)):
+    for angle_rad in TURNS_BY_COLOUR_RAD:
+        for turned in (T @ _turn(angle_rad), T @ _turn(-angle_rad)):
             if (other := _misfit(view, turned, tree)) < cost:
                 T, cost = turned, other
     return T
