@@ -1,5 +1,7 @@
 """Given poses that are a little off: said by how much, and refined on the table and the object."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from fuse import scenes
@@ -8,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from pipeline.fuse import layouts, posing, recorded, tsdf
 from pipeline.geometry import frames
 from pipeline.geometry.cavity import cavity
+from pipeline.scan.shapes import shape
 
 
 def located(views):
@@ -35,6 +38,20 @@ def test_poses_of_a_shaky_arm_are_refined(scan, name):
     room = cavity(surface.vertices_m, surface.triangles, name=name)
     assert room.capacity_m3 == pytest.approx(case.shape.capacity_m3, rel=0.02)
     assert surface.vertices_m[:, 2].max() == pytest.approx(case.shape.height_m, abs=0.001)
+
+
+def test_views_of_a_round_object_by_a_camera_that_is_askew_are_refined_and_keep_their_turns():
+    """As by a wrong hand-eye calibration: they turned about the object's axis by up to 60°, and all stayed as given."""
+    given, _ = scenes.views(shape("small_cup"), 18)
+    askew = frames.transform(Rotation.from_rotvec([0.007, -0.005, 0.003]).as_matrix(), np.full(3, 0.0017))
+    found = located(replace(given, T_world_cameras=[T @ askew for T in given.T_world_cameras]))
+    assert found.facts()["poses"] == "refined"
+    for T, right in zip(found.views.T_world_cameras, given.T_world_cameras, strict=True):
+        turn = Rotation.from_matrix(T[:3, :3] @ askew[:3, :3].T @ right[:3, :3].T).as_rotvec()
+        assert abs(np.degrees(turn[2])) < 1.0
+    surface = tsdf.fuse(found.views, found.placement, 0.00125, 0.0025, "cup")
+    room = cavity(surface.vertices_m, surface.triangles, name="cup")
+    assert room.capacity_m3 == pytest.approx(shape("small_cup").capacity_m3, rel=0.03)
 
 
 def test_what_a_view_shows_of_the_table_stands_it_upright():

@@ -148,6 +148,22 @@ def test_the_table_closes_a_ring_without_a_floor():
     assert "as low as the table" in told
 
 
+@pytest.mark.parametrize("slit_mm", [2, 10])
+def test_a_foot_that_is_torn_at_the_table_is_closed_and_a_wall_that_is_open_further_up_is_told(slit_mm):
+    """A camera by time of flight sees a cup's inside too deep, its floor in the table: it held nothing, and nothing was said."""
+    tube = thin(35, 38, 50, 2.0, 0.0)
+    tube.vertices_m = tube.vertices_m + [0, 0, slit_mm / 1e3]
+    surface, _ = fused(scenes.views(tube, 16)[0])
+    if slit_mm == 2:
+        assert surface.open_below_m is None
+        assert surface.table_closed_m2 == pytest.approx(np.pi * 0.033**2, rel=0.15)
+        assert cavity(surface.vertices_m, surface.triangles, name="tube").capacity_m3 > 150e-6
+        return
+    assert surface.open_below_m == pytest.approx(slit_mm / 1e3, abs=0.003)
+    (told,) = coverage.complaints({}, open_below_m=surface.open_below_m)
+    assert "found to hold nothing" in told
+
+
 def test_a_colander_is_told_to_have_holes():
     """It held two litres, and nothing was said."""
     bowl = thin(60, 80, 60, 2.5, 2.5)

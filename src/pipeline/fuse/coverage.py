@@ -86,9 +86,10 @@ def complaints(
     lowest_m: float = 0.0,
     stepped_m: float | None = None,
     table_closed_m2: float = 0.0,
+    open_below_m: float | None = None,
 ) -> list[str]:
     """Return a sentence for each part that was poorly seen or not at all, a wall that was thickened, a foot that is missing, a
-    step round the foot, and a floor that is the table."""
+    step round the foot, a floor that is the table, and one that is missing."""
     inside = [shares.get("inner_wall"), shares.get("floor")]
     told = [NO_INSIDE] if shares and inside == [None, None] else _poor(shares)
     if any(share is not None and share < GUESSED for share in inside):
@@ -112,7 +113,13 @@ def complaints(
         told.append(
             f"{1e4 * table_closed_m2:.1f} cm² of its floor are as low as the table, which closes it there: if it has holes, as a "
             "colander or the tube of a cake tin, it holds less than is found or nothing; if its floor is clear, less by it; if "
-            "it is very thin, all is well"
+            "it is very thin, all is well; if not, the camera measures its inside too deep, as those by time of flight do, and it "
+            "holds less than is found"
+        )
+    if open_below_m is not None:
+        told.append(
+            f"it was found to hold nothing, as its inside is open below {open_below_m * 1e3:.0f} mm above the table: it has holes, "
+            "or its wall is too thin for this camera there; record more views from nearer, or drop a mesh of it"
         )
     return told
 

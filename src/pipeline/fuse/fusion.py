@@ -72,7 +72,12 @@ def fused(
     }
     lowest_m = float(surface.vertices_m[:, 2].min())
     told = recorded.complaints(facts) + coverage.complaints(
-        shares, surface.thickened_share, lowest_m, coverage.step_m(surface), surface.table_closed_m2
+        shares,
+        surface.thickened_share,
+        lowest_m,
+        coverage.step_m(surface),
+        surface.table_closed_m2,
+        surface.open_below_m,
     )
     return replace(_result(surface, n_points, True, rng, facts), complaints=tuple(told))
 

@@ -9,6 +9,7 @@ from pipeline.errors import PipelineError
 from pipeline.fuse import levelled, placement, registration, table, turning
 from pipeline.fuse.raw import Views
 from pipeline.fuse.table import Placement, Plane
+from pipeline.fuse.together import HOLD_GIVEN_TURN
 from pipeline.geometry import frames
 
 # Right poses are off by 0.05 to 0.15 mm, by 0.3 in images of 512 pixels across 90°; by 0.9 mm the inside of a mug is lost.
@@ -49,7 +50,7 @@ def refined(
             stood.append(levelled.shown(views, i, there, name))
     if len(stood) < registration.LEAST_VIEWS:
         return None
-    poses = turning.swept(stood, [np.eye(4)] * len(stood), rng)
+    poses = turning.swept(stood, [np.eye(4)] * len(stood), rng, HOLD_GIVEN_TURN)
     known = replace(place, T_object_world=np.eye(4))
     poses, _ = registration.fitted_to_surface(stood, poses, views, name, rng, known)
     posed = registration.posed(views, stood, poses)

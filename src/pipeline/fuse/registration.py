@@ -13,7 +13,7 @@ from pipeline.fuse.levelled import Levelled, axis_of, level, raised_m
 from pipeline.fuse.raw import Views
 from pipeline.fuse.smoothing import vertex_normals
 from pipeline.fuse.table import Placement
-from pipeline.fuse.together import fitted_together, moved
+from pipeline.fuse.together import HOLD_GIVEN_TURN, fitted_together, moved
 from pipeline.geometry import frames
 from pipeline.geometry.surface import Surface
 
@@ -192,8 +192,9 @@ def fitted_to_surface(
     """Return the poses after views were fused and fitted to the surface, again and again, and the last surface.
 
     The surface is the mean of all views, so its normals and edges are better than those of any one. known: where the object
-    stands in the level frames, when that is known.
+    stands in the level frames, when that is known, as it is with given poses: their turns are then held.
     """
+    hold_turn = 0.0 if known is None else HOLD_GIVEN_TURN
     for _ in range(ROUNDS):
         shown = posed(views, stood, poses)
         if known is None:
@@ -205,7 +206,7 @@ def fitted_to_surface(
         T_world_object = frames.inverse(place.T_object_world)
         normals = frames.rotate(T_world_object, vertex_normals(surface.vertices_m, surface.triangles, 1))
         vertices = frames.apply(T_world_object, surface.vertices_m)
-        poses = fitted_together(stood, poses, vertices, surface.triangles, normals)
+        poses = fitted_together(stood, poses, vertices, surface.triangles, normals, hold_turn)
     return poses, Surface(vertices, surface.triangles)
 
 

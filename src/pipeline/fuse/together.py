@@ -17,6 +17,9 @@ LEAST_FACING = 0.25  # cosine between ray and surface: beyond, the noise is larg
 ROBUST_M = 0.002  # residuals beyond count less
 # In each equation, a point: holds what the pairs do not determine, the turn of a round cup.
 HOLD = np.array([1e-6, 1e-3, 1e-3])
+# In each equation of a view whose pose was given, a point: holds its turn to the given one. The noise of a round object's normals
+# speaks for other turns with a fifth of it, a mug's handle against wrong ones with four times as much.
+HOLD_GIVEN_TURN = 5e-5
 
 
 def fitted_together(
@@ -25,12 +28,17 @@ def fitted_together(
     vertices_m: np.ndarray,
     triangles: np.ndarray,
     normals: np.ndarray,
+    hold_turn: float = 0.0,
 ) -> list[np.ndarray]:
-    """Return T_world_level of the views after steps to a surface, with unit normals (V, 3) at its vertices, that follows them."""
+    """Return T_world_level of the views after steps to a surface, with unit normals (V, 3) at its vertices, that follows them.
+
+    hold_turn: how much, a point, each view's turn is held to none.
+    """
     surface, tree = Surface(vertices_m, triangles), cKDTree(vertices_m)
     for _ in range(STEPS):
         pairs = [_pairs(view, T, surface, tree, normals) for view, T in zip(views, poses, strict=True)]
-        poses = [moved(*step) @ T for step, T in zip(_steps(pairs, tree.n), poses, strict=True)]
+        steps = _steps(pairs, tree.n, np.array([turn_rad(T) for T in poses]), hold_turn)
+        poses = [moved(*step) @ T for step, T in zip(steps, poses, strict=True)]
     return poses
 
 
@@ -38,6 +46,11 @@ def moved(turn_rad: float, dx_m: float, dy_m: float) -> np.ndarray:
     """Return the transform of a turn about z and a shift across it."""
     turn = frames.rotation_about(np.array([0.0, 0.0, 1.0]), turn_rad)
     return frames.transform(turn, np.array([dx_m, dy_m, 0.0]))
+
+
+def turn_rad(T: np.ndarray) -> float:
+    """Return the turn about z of such a transform."""
+    return float(np.arctan2(T[1, 0], T[0, 0]))
 
 
 def motions(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
@@ -68,8 +81,16 @@ def _pairs(
     return vertex[good], apart_m[good], motions(there[good], n[good])
 
 
-def _steps(pairs: list[tuple[np.ndarray, np.ndarray, np.ndarray]], n_vertices: int) -> np.ndarray:
-    """Return turn and shift (V, 3) of each view that bring all pairs together, where every vertex goes to their mean."""
+def _steps(
+    pairs: list[tuple[np.ndarray, np.ndarray, np.ndarray]],
+    n_vertices: int,
+    turns_rad: np.ndarray,
+    hold_turn: float,
+) -> np.ndarray:
+    """Return turn and shift (V, 3) of each view that bring all pairs together, where every vertex goes to their mean.
+
+    turns_rad (V,): by how much the views are turned already.
+    """
     n = len(pairs)
     left, right = np.zeros((n, 3, n, 3)), np.zeros((n, 3))
     total, pull, push = np.zeros(n_vertices), np.zeros(n_vertices), np.zeros((n_vertices, n, 3))
@@ -77,6 +98,8 @@ def _steps(pairs: list[tuple[np.ndarray, np.ndarray, np.ndarray]], n_vertices: i
         weight = 1 / (1 + (apart_m / ROBUST_M) ** 2)
         left[k, :, k] = np.einsum("n,ni,nj->ij", weight, motion, motion) + np.diag(HOLD) * (len(vertex) + 1)
         right[k] = np.einsum("n,ni,n->i", weight, motion, apart_m)
+        left[k, 0, k, 0] += hold_turn * len(vertex)
+        right[k, 0] -= hold_turn * len(vertex) * turns_rad[k]
         total += np.bincount(vertex, weight, n_vertices)
         pull += np.bincount(vertex, weight * apart_m, n_vertices)
         for i in range(3):

@@ -25,6 +25,8 @@ EXCESS_VOXELS = 0.8
 EXCESS_RAMP_M = 0.003
 LEAST_VOTES, PRIOR_VOTES, UNSEEN_VOTE = 0.2, 0.5, 0.1
 LEAST_WEIGHT = 0.3  # of the cosines under which pixels saw a vertex, for it to count as seen: one view at 70°
+# Up to this height a torn foot is closed by the table. Open below by less than `LEAST_DRAIN_M2` are corners.
+FOOT_M, LEAST_DRAIN_M2 = 0.004, 0.0001
 _AROUND = 2  # voxels around one, to which its value is drawn
 
 
@@ -34,6 +36,7 @@ class Surface:
 
     seen (V,): by a camera, not closed by us. inner (V,): at the cavity, which is every place walled in on its level.
     table_closed_m2: area of the cavity's floor that is the table. thickened_share: of the outside, where the wall was too thin.
+    open_below_m: the height below which the cavity is open, or None where it holds liquid.
     """
 
     vertices_m: np.ndarray
@@ -42,6 +45,7 @@ class Surface:
     inner: np.ndarray
     table_closed_m2: float = 0.0
     thickened_share: float = 0.0
+    open_below_m: float | None = None
 
 
 def fuse(views: Views, placement: Placement, voxel_m: float, truncation_m: float, name: str) -> Surface:
@@ -66,8 +70,10 @@ def fuse(views: Views, placement: Placement, voxel_m: float, truncation_m: float
     if without_shadow is not None:
         value, walled_in = without_shadow, enclosed(without_shadow > 0)
     floor = _table_layers(voxel_m) - lowest[2]
-    table_closed_m2 = float(walled_in[:, :, floor].sum()) * voxel_m**2
-    value[:, :, floor][walled_in[:, :, floor]] = -1.0
+    closed, open_from = closed_by_table(walled_in, value > 0, floor, voxel_m)
+    value[closed] = -1.0
+    table_closed_m2 = float(closed.any(axis=2).sum()) * voxel_m**2
+    open_below_m = None if open_from is None else float((open_from + lowest[2]) * voxel_m)
     vertices, triangles = _marched(
         value * truncation_m, lowest, voxel_m, f"{name}: expected a surface from {len(views.depths_m)} views"
     )
@@ -79,7 +85,7 @@ def fuse(views: Views, placement: Placement, voxel_m: float, truncation_m: float
     if without_shadow is not None:
         vertices = evened(vertices, triangles, inner, ~inner & ~base, seen)
     vertices, thickened = parted(vertices, triangles, inner, ~inner & ~base)
-    return Surface(vertices, triangles, seen, inner, table_closed_m2, thickened)
+    return Surface(vertices, triangles, seen, inner, table_closed_m2, thickened, open_below_m)
 
 
 def _excess_m(heights_m: np.ndarray, voxel_m: float) -> np.ndarray:
@@ -191,6 +197,26 @@ def enclosed(free: np.ndarray) -> np.ndarray:
         return np.zeros_like(free)
     sizes = np.bincount(rooms.ravel())
     return ndimage.binary_dilation(rooms == sizes[1:].argmax() + 1, level) & free
+
+
+def closed_by_table(
+    walled_in: np.ndarray, free: np.ndarray, floor: int, voxel_m: float
+) -> tuple[np.ndarray, int | None]:
+    """Return the voxels (nx, ny, nz) that become solid so that the table closes the cavity, and the layer below which it is open.
+
+    It reaches down to the table's layer `floor`, or to a foot that noise tore, whose lowest layers let it out sideways.
+    """
+    closed, open_from = np.zeros_like(free), None
+    closed[:, :, floor] = walled_in[:, :, floor]
+    for z in range(floor + 1, free.shape[2]):
+        drains = walled_in[:, :, z] & free[:, :, z - 1] & ~walled_in[:, :, z - 1]
+        if np.count_nonzero(drains) * voxel_m**2 < LEAST_DRAIN_M2:
+            continue
+        if (z - floor + 1) * voxel_m > FOOT_M:
+            open_from = z
+        else:
+            closed[:, :, floor:z] |= drains[..., None]
+    return closed, open_from
 
 
 def touches(

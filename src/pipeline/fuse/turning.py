@@ -13,7 +13,7 @@ from pipeline.command import progress
 from pipeline.fuse.evidence import Evidence, nearest
 from pipeline.fuse.levelled import NORMAL_M, Levelled
 from pipeline.fuse.raw import Views
-from pipeline.fuse.together import ALIKE, HOLD, ROBUST_M, motions, moved
+from pipeline.fuse.together import ALIKE, HOLD, ROBUST_M, motions, moved, turn_rad
 from pipeline.geometry import frames
 
 TURNS, REFINED = 72, 6
@@ -73,7 +73,7 @@ def _known_turn(
         moved = np.abs(stood[j].T_level_camera[2] - stood[k].T_level_camera[2]).max()
         if j != k and moved < SAME_CAMERA:
             turned = angles_deg[stood[k].number] - angles_deg[stood[j].number]
-            return float(np.arctan2(poses[j][1, 0], poses[j][0, 0]) - np.radians(turned))
+            return turn_rad(poses[j]) - float(np.radians(turned))
     return None
 
 
@@ -129,8 +129,8 @@ def _misfit(view: Levelled, T: np.ndarray, tree: cKDTree) -> float:
     return float(np.mean(np.minimum(distance / CAP_M, 1.0) ** 2))
 
 
-def _icp(view: Levelled, T: np.ndarray, tree: cKDTree, iterations: int) -> np.ndarray:
-    """Return T after steps towards the nearest features of the model."""
+def _icp(view: Levelled, T: np.ndarray, tree: cKDTree, iterations: int, hold_turn: float = 0.0) -> np.ndarray:
+    """Return T after steps towards the nearest features of the model; hold_turn: how much, a point, its turn is held to none."""
     for _ in range(iterations):
         features = view.features(T)
         distance, index = tree.query(features, distance_upper_bound=CAP_M)
@@ -138,7 +138,8 @@ def _icp(view: Levelled, T: np.ndarray, tree: cKDTree, iterations: int) -> np.nd
         here, there = features[near], tree.data[index[near]]
         # A handle's left half, seen by one view, is not its right half, seen by another.
         alike = np.einsum("nc,nc->n", here[:, 3:6], there[:, 3:6]) > ALIKE * NORMAL_M**2
-        step = _fitting_step(here[alike, :3], there[alike, :3], there[alike, 3:6] / NORMAL_M)
+        planes = there[alike, :3], there[alike, 3:6] / NORMAL_M
+        step = _fitting_step(here[alike, :3], *planes, hold_turn, turn_rad(T))
         T = step @ T
         if np.abs(step - np.eye(4)).max() < 1e-5:
             break
@@ -148,17 +149,19 @@ def _icp(view: Levelled, T: np.ndarray, tree: cKDTree, iterations: int) -> np.nd
 def _turned_by_colour(view: Levelled, T: np.ndarray, tree: cKDTree) -> np.ndarray:
     """Return T turned about the view's axis to where its colours fit best: planes of a round object do not tell turns."""
     cost = _misfit(view, T, tree)
-    for turn_rad in TURNS_BY_COLOUR_RAD:
-        for turned in (T @ _turn(turn_rad), T @ _turn(-turn_rad)):
+    for angle_rad in TURNS_BY_COLOUR_RAD:
+        for turned in (T @ _turn(angle_rad), T @ _turn(-angle_rad)):
             if (other := _misfit(view, turned, tree)) < cost:
                 T, cost = turned, other
     return T
 
 
-def _fitting_step(here: np.ndarray, there: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def _fitting_step(
+    here: np.ndarray, there: np.ndarray, normals: np.ndarray, hold_turn: float, turned_rad: float
+) -> np.ndarray:
     """Return the small turn about z and shift across it that bring points (N, 3) into planes (Chen & Medioni 1991).
 
-    The planes pass through `there` (N, 3) with unit normals (N, 3).
+    The planes pass through `there` (N, 3) with unit normals (N, 3); turned_rad: by how much the view is turned already.
     """
     if len(here) < 20:
         return np.eye(4)
@@ -169,17 +172,24 @@ def _fitting_step(here: np.ndarray, there: np.ndarray, normals: np.ndarray) -> n
     right = np.einsum("n,ni,n->i", w, A, b)
     # The pairs hold themselves a little, for the shift alone: of a rim seen from above no plane stands across.
     normal[[1, 2], [1, 2]] += ALONG * w.sum()
+    normal[0, 0] += hold_turn * len(b)
+    right[0] -= hold_turn * len(b) * turned_rad
     right[1:] += ALONG * np.einsum("n,nc->c", w, (there - here)[:, :2])
     return moved(*np.linalg.solve(normal, right))
 
 
-def swept(stood: list[Levelled], poses: list[np.ndarray], rng: np.random.Generator) -> list[np.ndarray]:
-    """Return the poses after every view was fitted to those of the other half, again and again."""
+def swept(
+    stood: list[Levelled], poses: list[np.ndarray], rng: np.random.Generator, hold_turn: float = 0.0
+) -> list[np.ndarray]:
+    """Return the poses after every view was fitted to those of the other half, again and again.
+
+    hold_turn: how much, a point, each view's turn is held to none.
+    """
     poses = list(poses)
     fine = [_some(view, FINE, rng) for view in stood]
     for sweep in range(2 * SWEEPS):
         half = rng.permutation(len(stood)) % 2 == sweep % 2
         tree = cKDTree(np.concatenate([fine[k].features(poses[k]) for k in np.nonzero(half)[0]]))
         for k in np.nonzero(~half)[0]:
-            poses[k] = _icp(fine[k], poses[k], tree, 3)
+            poses[k] = _icp(fine[k], poses[k], tree, 3, hold_turn)
     return poses
