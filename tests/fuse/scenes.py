@@ -55,6 +55,25 @@ def of_one_side(name: str, towards_deg: float, arc_deg: float, n: int = 48) -> V
     )
 
 
+def off_axis(given: Views, axis_m: np.ndarray, off_m: float) -> Views:
+    """Return the views with poses by which the turntable's upright axis is `off_m` from `axis_m` (3,), away from the first view."""
+    eyes = np.array([T[:2, 3] - axis_m[:2] for T in given.T_world_cameras])
+    outwards = eyes / np.linalg.norm(eyes, axis=1, keepdims=True)
+    shifts = off_m * (outwards - outwards[0])
+    poses = [
+        frames.transform(np.eye(3), np.array([*shift, 0.0])) @ T
+        for shift, T in zip(shifts, given.T_world_cameras, strict=True)
+    ]
+    return replace(given, T_world_cameras=poses)
+
+
+def one_moved(given: Views, shift_m: float) -> Views:
+    """Return the views with the last one's pose moved along the table."""
+    *others, last = given.T_world_cameras
+    aside = frames.transform(np.eye(3), np.array([shift_m, 0.0, 0.0]))
+    return replace(given, T_world_cameras=[*others, aside @ last])
+
+
 def shaken(given: Views, shift_m: float, turn_deg: float, seed: int = 3) -> Views:
     """Return the views with poses that are off at random: standard deviations of each coordinate of shift and turn."""
     rng = np.random.default_rng(seed)

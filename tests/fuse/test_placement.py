@@ -12,6 +12,7 @@ from fuse.conftest import OPTIONS
 from pipeline.errors import PipelineError
 from pipeline.fuse import layouts, levelled, placement, posing, recorded, registration
 from pipeline.fuse.fusion import fused
+from pipeline.fuse.planes import planes
 from pipeline.geometry import frames
 from pipeline.scan import camera, recording
 from pipeline.scan.shapes import shape
@@ -200,7 +201,7 @@ def test_an_object_on_a_board_of_markers_stands_on_it(tmp_path, width_m):
     check_cup(place)
     views = layouts.read(tmp_path)
     assert posing.off_m(views, place) < posing.OFF_M
-    on_board = recorded.Located(views, plane, place, [], {})
+    on_board = recorded.Located(views, plane, place, planes(views, place), [], {})
     assert on_board.spread_m < 0.0015
 
 

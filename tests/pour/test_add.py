@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+import trimesh
 import yaml
 from fuse import writers
 
@@ -64,6 +65,24 @@ def test_another_depth_scale_is_an_option(project, recorded, tmp_path, capsys):
     with pytest.raises(PipelineError, match=r"depth.scale"):
         main(["add", str(scan), "--name", "my_cup", "--project", str(project.folder)])
     assert _added(project, capsys, scan, "--depth-scale", "5000")["views_left_out"] == []
+
+
+def test_what_fuse_would_complain_of_is_said_at_once(project, recorded, tmp_path, capsys):
+    """Of a recording, and of a mesh; they were left to the log of the workflow."""
+    scan, pot = tmp_path / "scan", tmp_path / "pot.stl"
+    moved = np.eye(4)
+    moved[0, 3] = 0.1
+    writers.seven_scenes(scan, [*recorded[:-1], (recorded[-1][0], moved @ recorded[-1][1])])
+    found = _added(project, capsys, scan)
+    assert any(said.startswith("frame-000009.depth.png: left out") for said in found["complaints"])
+    assert found["views_left_out"] == ["frame-000009.depth.png"]
+    profile = [(0.003, 0), (0.04, 0), (0.04, 0.08), (0.037, 0.08), (0.037, 0.003), (0.003, 0.003), (0.003, 0)]
+    trimesh.creation.revolve(profile, sections=64).export(pot)
+    main(["add", str(pot), "--name", "pot", "--project", str(project.folder)])
+    place, complaint, following = capsys.readouterr().out.splitlines()
+    assert "pot: a mesh" in place
+    assert "a hole through which liquid would leave" in complaint
+    assert following == "next: snakemake -c2 reports/roc.pdf"
 
 
 def test_an_empty_folder_is_refused(project, tmp_path):

@@ -60,7 +60,7 @@ def fused(
     tell("poses, table and object")
     scan = recorded.located(raw, str(folder), rng)
     tell("the surface")
-    surface = tsdf.fuse(scan.views, scan.placement, voxel_m, truncation_m, str(folder))
+    surface = tsdf.fuse(scan.views, scan.placement, voxel_m, truncation_m, str(folder), scan.seen_by)
     recorded.check_registered(scan, surface.vertices_m, surface.seen, str(folder))
     tell("how well it fits, points on it")
     shares = coverage.shares_seen(surface)

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from pipeline.errors import PipelineError
-from pipeline.fuse import agreement, placement, posing, registration
+from pipeline.fuse import agreement, placement, posing, registration, sliding
+from pipeline.fuse.planes import Planes, planes
 from pipeline.fuse.raw import Views
 from pipeline.fuse.table import Placement, Plane
 
@@ -17,13 +18,14 @@ LEAST_SEEN, LOW_SHARE = 0.85, 0.1  # of the surface higher than this share of th
 
 @dataclass(frozen=True)
 class Located:
-    """Views that fit together, the table and the object on it; left_out: names of the views that do not fit;
+    """Views that fit together and their planes, the table and the object on it; left_out: names of the views that do not fit;
     registration: how poses were found, empty where they were given; poses_off_m: by how much they were off as given, and whether
     they were refined."""
 
     views: Views
     plane: Plane
     placement: Placement
+    seen_by: Planes
     left_out: list[str]
     registration: dict[str, Any]
     poses_off_m: float | None = None
@@ -65,7 +67,7 @@ def complaints(facts: dict[str, Any]) -> list[str]:
         refused = "fused as given, as too little is seen to refine them"
         done = refused if as_given else "refined on table and object"
         told.append(
-            f"the poses are off by {1e3 * off_m:.1f} mm, by the table in each view; they were {done}; "
+            f"the poses are off by {1e3 * off_m:.1f} mm, by table and object in each view; they were {done}; "
             "calibrate the camera's pose better"
         )
     by_poses, spread_m = off_m > posing.OFF_M and as_given, facts["table_spread_m"]
@@ -101,16 +103,20 @@ def located(views: Views, name: str, rng: np.random.Generator) -> Located:
         views, found = registration.registered(views, name, rng)
     views, left_out = agreement.checked(views, name, rng, are_given=not found)
     plane, place = placement.find(views, name, rng)
+    scan = Located(views, plane, place, planes(views, place), left_out, found)
     if found:
-        return Located(views, plane, place, left_out, found)
-    off_m = posing.off_m(views, place)
-    scan = Located(views, plane, place, left_out, found, off_m)
+        return scan
+    aside = rng.spawn(1)[0]  # what is drawn later stays as it is
+    off_m = max(posing.off_m(views, place), sliding.off_m(scan.seen_by, place, aside))
+    scan = replace(scan, poses_off_m=off_m)
     refined = posing.refined(views, place, name, rng) if off_m > posing.OFF_M else None
     if refined is None:
         return scan
     views, unseen = refined
-    place = posing.shown_again(views, place)
-    return replace(scan, views=views, placement=place, left_out=left_out + unseen, is_refined=True)
+    place, left_out = posing.shown_again(views, place), left_out + unseen
+    return replace(
+        scan, views=views, placement=place, seen_by=planes(views, place), left_out=left_out, is_refined=True
+    )
 
 
 def check_registered(scan: Located, vertices_m: np.ndarray, seen: np.ndarray, name: str) -> None:

@@ -48,12 +48,19 @@ class Surface:
     open_below_m: float | None = None
 
 
-def fuse(views: Views, placement: Placement, voxel_m: float, truncation_m: float, name: str) -> Surface:
+def fuse(
+    views: Views,
+    placement: Placement,
+    voxel_m: float,
+    truncation_m: float,
+    name: str,
+    seen_by: Planes | None = None,
+) -> Surface:
     """Fuse the views (Curless & Levoy 1996) in the object frame into a closed surface that stands on z = 0.
 
     Space that no camera saw free counts as solid, down to the table: this closes the underside, the inside of the wall and what
     is merely unseen of the cavity's floor. The two sides of a wall are measured apart, so that the truncation may exceed its
-    thickness.
+    thickness. seen_by: the planes of what the views measure, where they are known.
     """
     if not 0 < voxel_m <= truncation_m / 2:
         raise PipelineError(
@@ -61,7 +68,7 @@ def fuse(views: Views, placement: Placement, voxel_m: float, truncation_m: float
         )
     truncation_m = min(truncation_m, max(LARGEST_TRUNCATION_M, 2 * voxel_m))
     lowest, covered = _box(placement, voxel_m)
-    seen_by = planes(views, placement)
+    seen_by = seen_by or planes(views, placement)
     value, measured = _field(seen_by, placement.points_m, lowest, covered, voxel_m, truncation_m)
     heights_m = (lowest[2] + np.arange(value.shape[2])) * voxel_m
     value -= np.float32(_excess_m(heights_m, voxel_m) / truncation_m)

@@ -113,22 +113,24 @@ def _read(folder: Path, source: Path) -> dict:
     try:
         found = layouts.read(folder)
         if not isinstance(found, DroppedMesh):
+            read = {"layout": found.layout, "n_views": found.n_found}
             # Finding poses takes minutes; given ones are checked at once, and with them table and object.
-            left_out = (
-                recorded.located(found, str(folder), np.random.default_rng(0)).left_out
-                if found.T_world_cameras
-                else []
-            )
-            return {"layout": found.layout, "n_views": found.n_found, "views_left_out": left_out}
+            if not found.T_world_cameras:
+                return {**read, "views_left_out": [], "complaints": []}
+            scan = recorded.located(found, str(folder), np.random.default_rng(0))
+            return {**read, "views_left_out": scan.left_out, "complaints": recorded.complaints(scan.facts())}
         vertices_m, triangles, _, facts = dropped.read(found, np.random.default_rng(0))
         capacity_m3 = cavity(vertices_m, triangles, name=str(folder)).capacity_m3
     except PipelineError as error:
         raise PipelineError(_told(str(error), folder, source)) from error
-    size = {
+    return {
+        "layout": facts["layout"],
+        "n_views": 0,
+        "complaints": dropped.complaints(facts),
+        "capacity_m3": float(capacity_m3),
         "height_m": float(np.ptp(vertices_m[:, 2])),
         "width_m": float(np.ptp(vertices_m[:, :2], axis=0).max()),
     }
-    return {"layout": facts["layout"], "n_views": 0, "capacity_m3": float(capacity_m3), **size}
 
 
 def _told(message: str, folder: Path, source: Path) -> str:
@@ -146,4 +148,5 @@ def text(result: dict) -> str:
     what += f", {len(result['views_left_out'])} of them left out" if result.get("views_left_out") else ""
     if "capacity_m3" in result:
         what += f", {result['height_m'] * 1e3:.0f} mm high, holds {result['capacity_m3'] * 1e6:.0f} ml"
-    return f"{result['folder']}: {what}, layout {result['layout']}\nnext: snakemake -c2 reports/roc.pdf"
+    told = [f"{result['folder']}: {what}, layout {result['layout']}"]
+    return "\n".join([*told, *result["complaints"], "next: snakemake -c2 reports/roc.pdf"])
