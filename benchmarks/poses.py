@@ -15,7 +15,7 @@ from scipy.optimize import minimize
 
 from pipeline.artefacts import points, read_json, read_table
 from pipeline.errors import PipelineError
-from pipeline.fuse import fusion, layouts, outputs, placement, recorded, tsdf
+from pipeline.fuse import agreement, fusion, layouts, outputs, placement, recorded, tsdf
 from pipeline.fuse.raw import Views
 from pipeline.geometry import frames
 from pipeline.geometry.cavity import cavity
@@ -29,6 +29,7 @@ HOW = {"voxel_m": 0.00125, "truncation_m": 0.0025, "n_points": 12000, "seed": 2}
 # Millimetres and degrees, standard deviations of each axis.
 OFF = ((0.2, 0.03), (0.5, 0.1), (1.5, 0.3), (3.0, 0.5))
 DRIFT_M = 0.005
+AXIS_M, ASTRAY_M = (0.0005, 0.001, 0.002, 0.004), (0.02, 0.1)
 STARTS_DEG, FEW, MANY = 5, 400, 1500
 
 
@@ -159,6 +160,16 @@ def main() -> None:
         views = layouts.read(record(Path(scratch), "mug"))
         cases = [(f"{mm:g} mm, {deg:g}°", scenes.shaken(views, mm / 1e3, deg, SEED)) for mm, deg in OFF]
         cases.append((f"drift of {1e3 * DRIFT_M:g} mm over the views", drifting(views)))
+        axis_m = recording.pose_on_table(recording.generator(SEED, "mug", 0))[:3, 3]
+        cases += [
+            (f"a turntable's axis {1e3 * off_m:g} mm elsewhere", scenes.off_axis(views, axis_m, off_m))
+            for off_m in AXIS_M
+        ]
+        twelve = agreement.only(views, np.arange(VIEWS) % 3 == 0)
+        cases += [
+            (f"one of 12 views {1e3 * off_m:g} mm along the table", scenes.one_moved(twelve, off_m))
+            for off_m in ASTRAY_M
+        ]
         sys.stdout.write("| poses off, an axis | as given | refined |\n|---|---|---|\n")
         for said, case in cases:
             sys.stdout.write(f"| {said} | {as_given(case, 'mug')} | {refined(case, 'mug')} |\n")
