@@ -62,7 +62,9 @@ def test_depths_that_are_too_long_are_told_beside_poses_that_were_refined():
     assert "too long, and it holds 6% too much" in recorded.complaints(found.facts())[1]
     facts = {"poses": "refined", "poses_off_m": 0.001, "table_spread_m": 0.001}
     assert len(recorded.complaints(facts | {"depths_too_long": 0.004})) == 1
-    assert "too short, and it holds 4% too little" in recorded.complaints(facts | {"depths_too_long": -0.014})[1]
+    assert (
+        "too short, and it holds 4% too little" in recorded.complaints(facts | {"depths_too_long": -0.014})[1]
+    )
 
 
 def test_what_a_view_shows_of_the_table_stands_it_upright():

@@ -79,7 +79,9 @@ def too_long(given: Views, posed: Views) -> float:
     That way is told apart from a shift of all together, and from one across the axes.
     """
     before = dict(zip(given.names, given.T_world_cameras, strict=True))
-    ways = [T[:3, 3] - before[each][:3, 3] for each, T in zip(posed.names, posed.T_world_cameras, strict=True)]
+    ways = [
+        T[:3, 3] - before[each][:3, 3] for each, T in zip(posed.names, posed.T_world_cameras, strict=True)
+    ]
     terms = [np.hstack([np.eye(3), T[:3, :3]]) for T in posed.T_world_cameras]
     along_m = np.linalg.lstsq(np.concatenate(terms), np.concatenate(ways), rcond=None)[0][5]
     middles_m = np.stack([T[:3, 3] for T in posed.T_world_cameras]) - table.focus(posed)
