@@ -64,3 +64,18 @@ def test_an_object_whose_wall_shows_one_side_has_every_parameter_but_that(mappin
     found = read_table(path, "parameters").set_index("mapping")
     assert found["wall_m"].isna().all()
     assert found.drop(columns="wall_m").notna().all(axis=None)
+
+
+def test_what_the_mappings_do_not_agree_on_is_told(mapping, tmp_path):
+    wide = read_table(mapping, "mapping").assign(y_m=lambda table: 1.3 * table["y_m"])
+    other, paths = tmp_path / "mapping.parquet", [str(tmp_path / name) for name in ("p.parquet", "t.parquet")]
+    write_table(other, wide, "mapping")
+    written = ["--parameters", paths[0], "--tilt-references", paths[1]]
+    alike = _call("pipeline.parametrise", mapping, *written)
+    assert (alike.returncode, alike.stderr) == (0, "")
+    told = _call("pipeline.parametrise", mapping, *written, "--point-mapping", str(other))
+    assert told.returncode == 0
+    assert [line.split(" is ")[0] for line in told.stderr.splitlines()] == [
+        f"short_cup: the {what}" for what in ("radius", "hull volume", "capacity")
+    ]
+    assert "by label mapping: the object has little of the source's shape; see its parts in" in told.stderr

@@ -23,7 +23,7 @@ def _scan(seed: int):
     table = pd.DataFrame(
         np.hstack([noisy_m, facing[triangle]]), columns=["x_m", "y_m", "z_m", "nx", "ny", "nz"]
     )
-    parts = {part: body.parts(points_m, triangle)[part] for part in ("container", "rim")}
+    parts = {part: body.parts(points_m, triangle)[part] for part in ("container", "rim", "handle")}
     return warped(table.assign(area_m2=areas.sum() / len(points_m), valid=True, **parts), name="short_cup")
 
 

@@ -85,7 +85,9 @@ def read_off(mapped: Mapped) -> dict[str, float]:
         np.hstack([body.points_m, body.normals]), columns=["x_m", "y_m", "z_m", "nx", "ny", "nz"]
     )
     container, rim = body.parts[:, 0], body.parts[:, 1]
-    table = table.assign(area_m2=body.area_m2, container=container, rim=rim, valid=True)
+    table = table.assign(
+        area_m2=body.area_m2, container=container, rim=rim, handle=body.parts[:, 2], valid=True
+    )
     names = ("radius_m", "height_m", "volume_m3", "capacity_m3")
     values = evaluate(names, warped(table, name="body").pieces(hull_points=1000))
     return {name: values[name] for name in names}

@@ -8,8 +8,8 @@ import numpy as np
 from pipeline.artefacts import Frame, normals, points
 from pipeline.errors import PipelineError
 
-# What `evaluate` starts from: all points (N, 3) with their areas; those of the container with normals and areas, and evened;
-# those of the rim; how many points fill a hull.
+# What `evaluate` starts from: all points (N, 3) of some part, with their areas; those of the container with normals and areas, and
+# evened; those of the rim; how many points fill a hull.
 PIECES = (
     *("points_m", "area_m2", "container_m", "container_normals", "container_area_m2", "container_even_m"),
     *("rim_m", "hull_points"),
@@ -22,7 +22,8 @@ _AGREE = 0.7  # cosine between normals of the same side of a wall, at least
 
 @dataclass(frozen=True)
 class Cloud:
-    """A warped object: points (N, 3) in metres, object frame, normals (N, 3), areas (N,), which are container and rim (N,).
+    """A warped object: points (N, 3) in metres, object frame, normals (N, 3), areas (N,), which are container and rim (N,), and
+    which are of any part (N,): an arch over the opening, which the source has not, is of none.
 
     even_m (N, 3): the points with their noise averaged, where they are on the container's outside.
     """
@@ -32,15 +33,16 @@ class Cloud:
     area_m2: np.ndarray
     container: np.ndarray
     rim: np.ndarray
+    known: np.ndarray
     even_m: np.ndarray
 
     def pieces(self, hull_points: int, rows: np.ndarray | None = None) -> dict[str, Any]:
         """Return the `PIECES` of all points, or of some rows (M,), which may recur."""
         rows = np.arange(len(self.points_m)) if rows is None else rows
-        container, rim = rows[self.container[rows]], rows[self.rim[rows]]
+        container, rim, known = (rows[part[rows]] for part in (self.container, self.rim, self.known))
         return {
-            "points_m": self.points_m[rows],
-            "area_m2": self.area_m2[rows],
+            "points_m": self.points_m[known],
+            "area_m2": self.area_m2[known],
             "container_m": self.points_m[container],
             "container_normals": self.normals[container],
             "container_area_m2": self.area_m2[container],
@@ -54,7 +56,9 @@ def warped(table: Frame, *, name: str) -> Cloud:
     """Return the valid points of a table `mapping`; a `PipelineError` names the object if they lack a container or a rim."""
     valid = np.asarray(table["valid"], bool)
     points_m, directions = points(table)[valid], normals(table)[valid]
-    container, rim, area_m2 = (np.asarray(table[column])[valid] for column in ("container", "rim", "area_m2"))
+    container, rim, handle, area_m2 = (
+        np.asarray(table[column])[valid] for column in ("container", "rim", "handle", "area_m2")
+    )
     if min(container.sum(), rim.sum()) < _LEAST:
         raise PipelineError(
             f"{name}: expected a container and a rim after warping, found {container.sum()} and {rim.sum()} points; "
@@ -65,7 +69,7 @@ def warped(table: Frame, *, name: str) -> Cloud:
     outside[container] = _outward(points_m[container], directions[container])
     if outside.any():
         even_m[outside] = evened(points_m[outside], directions[outside])
-    return Cloud(points_m, directions, area_m2, container, rim, even_m)
+    return Cloud(points_m, directions, area_m2, container, rim, container | rim | handle, even_m)
 
 
 def _outward(points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:

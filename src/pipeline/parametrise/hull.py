@@ -24,7 +24,7 @@ def volume_m3(hull: ConvexHull) -> float:
 
 @parameter("m")
 def height_m(points_m: np.ndarray) -> float:
-    """Height of the container: h = max z - min z over all points, the range along the first dimension (up)."""
+    """Height of the container: h = max z - min z over all points of a part, the range along the first dimension (up)."""
     return float(np.ptp(points_m[:, 2]))
 
 

@@ -7,11 +7,10 @@ import numpy as np
 from pipeline.errors import PipelineError
 from pipeline.geometry import frames
 from pipeline.warp.clouds import Cloud
-from pipeline.warp.components import components
+from pipeline.warp.ring import rim_rings
 from pipeline.warp.roll import rim_low_m, roll
 
 UPRIGHT_MAX_RAD = np.radians(30.0)
-RING_COVERAGE_BINS = 36
 
 
 @dataclass(frozen=True)
@@ -76,27 +75,11 @@ def _first_axis(to_rim: np.ndarray, *, name: str) -> np.ndarray:
 
 
 def _rim_ring(cloud: Cloud) -> np.ndarray:
-    """Return the points (M, 3) of the candidate ring that goes round most of an opening that is open.
-
-    Edges of a base look like rims to local features; but across a base there is a surface.
-    """
-    pieces = [cloud.points_m[rows] for rows in components(cloud, cloud.parts[:, 1])]
-    rings = [ring for ring in pieces if len(ring) >= 30]
-    scores = [_ring_score(cloud.points_m, ring) for ring in rings]
-    if not scores or max(scores) <= 0.0:
+    """Return the points (M, 3) of the ring that looks most like that of an opening."""
+    rings = rim_rings(cloud)
+    if not rings:
         raise PipelineError(
-            f"{cloud.name}: expected a rim around an opening, but no ring of its points looks like one; look at the scan"
+            f"{cloud.name}: expected a rim around an opening, but no ring of its points looks like one; "
+            "see that the whole rim was scanned and nothing covers the opening, or put the object in objects.exclude"
         )
-    return rings[int(np.argmax(scores))]
-
-
-def _ring_score(points_m: np.ndarray, ring_m: np.ndarray) -> float:
-    """Return coverage × radius of a ring about the vertical through its mean; 0 where a surface closes it."""
-    centre = ring_m.mean(axis=0)
-    radius = np.linalg.norm((ring_m - centre)[:, :2], axis=1).mean()
-    azimuth = np.arctan2(*(ring_m - centre)[:, 1::-1].T)
-    bins = np.floor((azimuth + np.pi) / (2 * np.pi) * RING_COVERAGE_BINS).astype(int)
-    coverage = len(np.unique(bins)) / RING_COVERAGE_BINS
-    offset = points_m - centre
-    across = (np.linalg.norm(offset[:, :2], axis=1) < 0.5 * radius) & (np.abs(offset[:, 2]) < 0.15 * radius)
-    return 0.0 if across.any() else coverage * radius
+    return rings[0].points_m

@@ -9,13 +9,13 @@ from pipeline.warp import splines
 from pipeline.warp.alignment import PartFrame, part_frame, scale
 from pipeline.warp.clouds import Cloud, subset, thinned
 from pipeline.warp.deformation import Chain, Deformation, Kernels, PartStretch
+from pipeline.warp.foreign import near_rim
 from pipeline.warp.stretch import Stretch, between_extents, linear
 from pipeline.warp.warp import Warp, label_pairs, point_pairs
 
 NAME = "nearest_neighbour"
 REFINEMENT_POINTS = 4000
 BEND_CENTRES, BEND_STIFFNESS = 150, 1e-3
-TRIMS = 3  # fits to a target without what the source cannot know
 
 
 def fit(
@@ -29,14 +29,11 @@ def fit(
     target that the source fits as well at another size is the same thing at that size, and its rim is scaled, too.
     With bends, which the paper does not have either, a thin-plate spline then takes the pairs to each other: no factors
     make a bowl of a mug.
-    A source without a handle knows of none: what it cannot know of the target (`Warp.is_known`) is left out.
+    What the source cannot know of the target (`Warp.is_known`) is left out: a handle, where it has none, an arch over the opening.
     """
-    warp = _fitted(source, target, refinements, bends)
-    for _ in range(TRIMS):
-        if warp.is_known.all():
-            break
-        trimmed = subset(target, np.flatnonzero(warp.is_known))
-        warp = replace(_fitted(source, trimmed, refinements, bends), target=target)
+    known = coarse(source, target).is_known
+    seen = target if known.all() else subset(target, np.flatnonzero(known))
+    warp = replace(_fitted(source, seen, refinements, bends), target=target)
     return replace(warp, diagnostics={"refinements": float(refinements), "bends": float(bends)})
 
 
@@ -45,9 +42,31 @@ def _fitted(source: Cloud, target: Cloud, refinements: int, bends: int) -> Warp:
     if refinements:
         warp = _refine(warp, refinements)
     stretched = warp.deformation
+    if bends and _misses_rim(warp):
+        warp = replace(warp, deformation=Chain(stretched, _bend(warp, stretched, _with_rim(warp))))
     for _ in range(bends):
-        warp = replace(warp, deformation=Chain(stretched, _bend(warp, stretched)))
+        warp = replace(warp, deformation=Chain(stretched, _bend(warp, stretched, pairs(warp))))
     return warp
+
+
+def _misses_rim(warp: Warp) -> bool:
+    """Return whether most of the source's rim does not go to the target's: on a vase with a narrow opening, to its belly."""
+    thin, from_rows, to_rows = pairs(warp)
+    rim = thin.source.parts[from_rows, 1]
+    return bool(near_rim(thin.target.points_m[to_rows[rim]], warp.ring).mean() < 0.5)
+
+
+def _with_rim(warp: Warp) -> tuple[Warp, np.ndarray, np.ndarray]:
+    """Return `pairs` of which those of a rim's points are with the other's rim."""
+    thin, from_rows, to_rows = pairs(warp)
+    here, there = thin.source.parts[:, 1], near_rim(thin.target.points_m, warp.ring)
+    others = ~(here[from_rows] | there[to_rows])
+    rims = replace(thin, source=subset(thin.source, here), target=subset(thin.target, there))
+    forth, back = point_pairs(rims, 1)[0][:, 0], label_pairs(rims, 1)[0][:, 0]
+    met, home = np.flatnonzero(forth >= 0), np.flatnonzero(back >= 0)
+    here, there = np.flatnonzero(here), np.flatnonzero(there)
+    from_rows = np.concatenate([from_rows[others], here[met], here[back[home]]])
+    return thin, from_rows, np.concatenate([to_rows[others], there[forth[met]], there[home]])
 
 
 def _refine(warp: Warp, refinements: int) -> Warp:
@@ -104,9 +123,9 @@ def _refined(warp: Warp, stretch: Stretch) -> Stretch:
     return replace(stretch, scale=factors, offset_m=mean_y - factors * mean_x)
 
 
-def _bend(warp: Warp, stretched: Deformation) -> Kernels:
-    """Return the spline that takes the stretched source to the target, by the warp's present pairs."""
-    thin, from_rows, to_rows = pairs(warp)
+def _bend(warp: Warp, stretched: Deformation, found: tuple[Warp, np.ndarray, np.ndarray]) -> Kernels:
+    """Return the spline that takes the stretched source to the target, by pairs that were found."""
+    thin, from_rows, to_rows = found
     here_m = stretched.map(thin.source.points_m)
     step = max(1, len(here_m) // BEND_CENTRES)
     return splines.fit(here_m[from_rows], thin.target.points_m[to_rows], here_m[::step], BEND_STIFFNESS)

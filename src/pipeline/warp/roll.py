@@ -11,6 +11,7 @@ from pipeline.warp.components import components
 HANDLE_MIN_SHARE = 0.02
 # Shares of a handle's points that are labelled so, and that face the body from outside; how far off it, of the body's radius.
 LEAST_LABELLED, FACES_BODY, GAP = 0.3, 0.05, 0.05
+LONG = 1.5  # what reaches so many of the body's radii out is no spout of a rim
 WAY = np.linspace(0.15, 0.9, 26)  # shares of the way from a handle to the axis; its own wall comes before
 ALIKE = 0.8  # a second handle counts as large as the first from here on
 SECTORS, ROUND_SHARE, REPEATS = 72, 0.015, 0.9
@@ -64,21 +65,23 @@ def _horizontal(vector: np.ndarray) -> np.ndarray:
 def _handles(cloud: Cloud, origin_m: np.ndarray, ring_m: np.ndarray) -> list[np.ndarray]:
     """Return the rows of each handle, that with most points first.
 
-    A candidate stands off the body, and looks like a handle in part. A spout may do both; but it reaches the rim, and
-    nothing of it faces the body from outside.
+    A candidate stands off the body, and looks like a handle in part. A spout may do both; but it reaches the rim, nothing of it
+    faces the body from outside, and it is short.
     """
     if not cloud.parts[:, 2].any():
         return []
     off, outward = standing_off(cloud, origin_m)
+    radius_m = np.linalg.norm((ring_m - origin_m)[:, :2], axis=1).mean()
     low_m = rim_low_m(ring_m)
     found = []
     for rows in components(cloud, off):
         alike = rows[cloud.parts[rows, 2]]
         if len(rows) < HANDLE_MIN_SHARE * len(off) or len(alike) < LEAST_LABELLED * len(rows):
             continue
-        loops = np.mean(_outside_wall(cloud, rows, origin_m, outward)) > FACES_BODY
+        loops = np.mean(outside_wall(cloud, rows, origin_m, outward)) > FACES_BODY
         below = np.mean(cloud.points_m[rows, 2] >= low_m) < FACES_BODY
-        if loops or below:
+        reach_m = np.linalg.norm((cloud.points_m[rows] - origin_m)[:, :2], axis=1).max()
+        if loops or below or reach_m > LONG * radius_m:
             found.append(alike)
     return sorted(found, key=len, reverse=True)
 
@@ -110,7 +113,7 @@ def _body_radius(height_m: np.ndarray, radius_m: np.ndarray, outside: np.ndarray
     return np.interp(part, known, np.array(medians)[known])
 
 
-def _outside_wall(cloud: Cloud, rows: np.ndarray, origin_m: np.ndarray, outward: np.ndarray) -> np.ndarray:
+def outside_wall(cloud: Cloud, rows: np.ndarray, origin_m: np.ndarray, outward: np.ndarray) -> np.ndarray:
     """Return which points of a candidate (N,) face the axis and have an outer wall of something else on their way to it."""
     wall = np.setdiff1d(np.flatnonzero(outward > 0.5), rows)
     if not len(wall):

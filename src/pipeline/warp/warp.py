@@ -9,10 +9,9 @@ from pipeline.geometry import frames
 from pipeline.warp.alignment import PartFrame
 from pipeline.warp.clouds import Cloud, Mapped, subset
 from pipeline.warp.deformation import Deformation
+from pipeline.warp.foreign import foreign, near_rim, rim_ring
 from pipeline.warp.nearest import agreeing_neighbours, majority_of_neighbours, mean_of_neighbours
-from pipeline.warp.roll import standing_off
-
-FAR = 0.1  # further than this, in spreads of the container, a pair is no pair
+from pipeline.warp.ring import Ring
 
 
 @dataclass(frozen=True)
@@ -54,18 +53,13 @@ class Warp:
 
     @cached_property
     def is_known(self) -> np.ndarray:
-        """Which of the target's points (M,) the source can have, too.
+        """Which of the target's points (M,) the source can have, too: all but what is `foreign` to it."""
+        return ~foreign(self.target, self.target_frame, self.source)
 
-        All, where it has a handle itself; else not what stands off the target's body, is no part of its rim, and is far from all
-        points of the source with an agreeing normal. (Below the rim's ring a rim by the initial labels is none: handles look so.)
-        """
-        if self.source.parts[:, 2].any():
-            return np.ones(len(self.target.points_m), dtype=bool)
-        off, _ = standing_off(self.target, self.target_frame.T_object_part[:3, 3])
-        spread_m = np.linalg.norm(self.target_frame.spread_m)
-        far = label_pairs(self, 1)[1][:, 0] > FAR * spread_m
-        rim = self.target.parts[:, 1] & (self.target.points_m[:, 2] >= self.target_frame.rim_low_m)
-        return ~(off & far & ~rim)
+    @cached_property
+    def ring(self) -> Ring | None:
+        """The ring of the target's opening, by its initial labels."""
+        return rim_ring(self.target)
 
     @property
     def source_index(self) -> np.ndarray:
@@ -74,7 +68,7 @@ class Warp:
 
     @cached_property
     def _pairs(self) -> tuple[np.ndarray, np.ndarray]:
-        return point_pairs(self, 1)
+        return point_pairs(self, 1, self.is_known)
 
     @property
     def target_index(self) -> np.ndarray:
@@ -119,12 +113,14 @@ class Warp:
         The paper's point mapping.
         """
         target, aligned = self.target, self.aligned
-        index, distance = self._pairs if k == 1 else point_pairs(self, k)
+        index, distance = self._pairs if k == 1 else point_pairs(self, k, self.is_known)
         normals = mean_of_neighbours(target.normals, index)
         normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
         points_m = mean_of_neighbours(target.points_m, index)
-        cloud = Cloud(target.name, points_m, normals, aligned.area_m2, aligned.parts)
-        return Mapped(cloud, self.source_index, index[:, 0], index[:, 0] >= 0, distance[:, 0])
+        parts, valid = aligned.parts.copy(), index[:, 0] >= 0
+        parts[valid, 1] &= near_rim(points_m[valid], self.ring)
+        cloud = Cloud(target.name, points_m, normals, aligned.area_m2, parts)
+        return Mapped(cloud, self.source_index, index[:, 0], valid, distance[:, 0])
 
     def map_labels(self, k: int) -> Mapped:
         """Give each target point the labels that most of its k nearest source points with an agreeing normal have.
@@ -133,16 +129,20 @@ class Warp:
         """
         index, distance = label_pairs(self, k)
         parts = majority_of_neighbours(self.aligned.parts, index) & self.is_known[:, None]
+        parts[:, 1] &= near_rim(self.target.points_m, self.ring)
         cloud = replace(self.target, parts=parts)
         return Mapped(cloud, index[:, 0], np.arange(len(parts)), index[:, 0] >= 0, distance[:, 0])
 
 
-def point_pairs(warp: Warp, k: int) -> tuple[np.ndarray, np.ndarray]:
+def point_pairs(warp: Warp, k: int, known: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Return for each source point the k nearest target points with an agreeing normal: rows (N, k), distances (N, k).
 
-    Those that the source cannot know are none.
+    Of target points that are not `known` (M,) there are none.
     """
-    aligned, rows = warp.aligned, np.flatnonzero(warp.is_known)
+    aligned, rows = (
+        warp.aligned,
+        np.arange(len(warp.target.points_m)) if known is None else np.flatnonzero(known),
+    )
     near = subset(warp.target, rows)
     index, distance = agreeing_neighbours(aligned.points_m, aligned.normals, near.points_m, near.normals, k)
     return np.where(index >= 0, rows[index], -1), distance

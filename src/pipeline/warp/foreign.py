@@ -1,0 +1,79 @@
+"""What of a target a source has nothing like: arches over the opening, handles, spouts that are tubes, lugs. Upright."""
+
+import numpy as np
+
+from pipeline.warp.alignment import PartFrame
+from pipeline.warp.clouds import Cloud
+from pipeline.warp.components import components
+from pipeline.warp.ring import SECTORS, Ring, is_edge, rim_rings
+from pipeline.warp.roll import GAP, outside_wall, standing_off
+
+# Shares: of all points, that a piece has at least; of a turn, that it takes at most; of its own, that look into the container.
+LEAST_SHARE, WIDEST, INSIDE = 0.005, 0.4, 0.1
+GROUND_M = 0.002  # what comes so near to the table is a foot
+# Of the ring's radius: what is higher above it is no rim; what is further from its edge, neither.
+ABOVE, NEAR_RIM = 0.05, 0.25
+
+
+def foreign(target: Cloud, frame: PartFrame, source: Cloud) -> np.ndarray:
+    """Return which points (M,) of a target with a part frame a source cannot have.
+
+    What is above the opening, where nothing is above its own; what sticks out of the wall, but a handle for its own to go to.
+    """
+    ring = rim_ring(target)
+    if ring is None:
+        return np.zeros(len(target.points_m), dtype=bool)
+    own = rim_ring(source)
+    found = _overhead(target, ring)
+    if own is not None and _overhead(source, own).any():
+        found[:] = False
+    has_handle = bool(frame.handles) and source.parts[:, 2].any()
+    for rows in _sticking_out(target, ring, frame.T_object_part[:3, 3]):
+        towards = target.points_m[rows].mean(axis=0) - frame.T_object_part[:3, 3]
+        is_met = has_handle and towards @ frame.T_object_part[:3, 1] > np.cos(np.pi / 4) * np.linalg.norm(
+            towards[:2]
+        )
+        found[rows] |= not is_met
+    return found
+
+
+def rim_ring(cloud: Cloud) -> Ring | None:
+    """Return the ring of a cloud's opening, if there is one on top of its wall."""
+    rings = rim_rings(cloud)
+    return rings[0] if rings and is_edge(rings[0], cloud) else None
+
+
+def near_rim(points_m: np.ndarray, ring: Ring | None) -> np.ndarray:
+    """Return which points (N, 3) may be of a ring's rim: all, where it is not known."""
+    if ring is None:
+        return np.ones(len(points_m), dtype=bool)
+    distance_m, above_m, sector = ring.seen(points_m)
+    return np.hypot(distance_m - ring.radius_m[sector], above_m) <= NEAR_RIM * ring.size_m
+
+
+def _overhead(cloud: Cloud, ring: Ring) -> np.ndarray:
+    """Return which points (N,) are above the opening, as those of an arch, a bail, or a handle that rises above the rim."""
+    return ring.seen(cloud.points_m)[1] > ABOVE * ring.size_m
+
+
+def _sticking_out(cloud: Cloud, ring: Ring, origin_m: np.ndarray) -> list[np.ndarray]:
+    """Return the rows of each piece outside both the body, as round as it is there, and the rim's outline.
+
+    A part of the wall, such as the spout of a jug, looks into the container; a foot stands on the table.
+    """
+    off, outward = standing_off(cloud, origin_m)
+    distance_m, above_m, sector = ring.seen(cloud.points_m)
+    off &= distance_m > (1.0 + GAP) * ring.radius_m[sector]
+    low_m = cloud.points_m[:, 2].min()
+    found = []
+    for rows in components(cloud, off):
+        few = len(rows) < LEAST_SHARE * len(off)
+        wide = len(np.unique(sector[rows])) > WIDEST * SECTORS
+        if few or wide or cloud.points_m[rows, 2].min() < low_m + GROUND_M:
+            continue
+        inside = (
+            (outward[rows] < -0.5) & (above_m[rows] < 0.0) & ~outside_wall(cloud, rows, origin_m, outward)
+        )
+        if inside.mean() < INSIDE:
+            found.append(rows)
+    return found

@@ -1,0 +1,149 @@
+"""Targets with what no mug has: arches over the opening, lugs, long handles, dividers, narrow necks."""
+
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import trimesh
+from warp.bodies import cloud
+
+from pipeline.geometry.sampling import even_points, triangle_areas_and_normals
+from pipeline.geometry.surface import Surface
+from pipeline.scan import lofts
+from pipeline.scan.shapes import RIM_M, lip_distance
+from pipeline.warp.alignment import part_frame
+from pipeline.warp.clouds import ARRAYS, Cloud, Mapped
+from pipeline.warp.nearest_neighbour import fit
+from pipeline.warp.ring import rim_rings
+
+Profile = tuple[tuple[float, float], ...]
+POT: Profile = ((0, 1.5), (50, 1.5), (58, 1.5), (60, 20), (60, 50), (60, 78))
+VASE: Profile = ((0, 2), (25, 2), (60, 28), (75, 70), (60, 112), (30, 135))
+DISH: Profile = ((0, 2), (85, 2), (95, 6), (108, 22))
+HIGH_M = 0.0785
+
+
+def mm(*points: tuple[float, float, float]) -> np.ndarray:
+    return np.array(points) * 1e-3
+
+
+def rod(path_m: np.ndarray, radius_m: float) -> list[trimesh.Trimesh]:
+    """Return a round rod along a path (P, 3), in pieces."""
+    return [
+        trimesh.creation.cylinder(radius_m, segment=[start, end], sections=24)
+        for start, end in pairwise(path_m)
+    ]
+
+
+def arch() -> list[trimesh.Trimesh]:
+    turn = np.linspace(0, np.pi, 15)[:, None]
+    return rod(np.cos(turn) * mm((60, 0, 0)) + np.sin(turn) * mm((0, 0, 50)) + mm((0, 0, 76)), 0.004)
+
+
+def lugs() -> list[trimesh.Trimesh]:
+    path = mm((59, -22, 60), (84, -18, 62), (84, 18, 62), (59, 22, 60))
+    return [*rod(path, 0.004), *rod(path * [-1, 1, 1], 0.004)]
+
+
+def long_handle() -> list[trimesh.Trimesh]:
+    return rod(mm((59, 0, 66), (200, 0, 76)), 0.007)
+
+
+@cache
+def target(profile: Profile, more=None) -> Cloud:
+    """Return a loft with more joined to it from outside: true parts, the rest of it labelled as what it looks like, a handle."""
+    wall = lofts.wall([(r * 1e-3, z * 1e-3) for r, z in profile], 0.003)
+    body = trimesh.Trimesh(wall.vertices_m, wall.triangles)
+    whole = body
+    if more is not None:
+        room = trimesh.creation.cylinder(0.0585, segment=[[0, 0, 0.02], [0, 0, HIGH_M]], sections=96)
+        whole = trimesh.boolean.union([body, *(piece.difference(room) for piece in more())])
+    vertices_m, triangles = np.asarray(whole.vertices), np.asarray(whole.faces)
+    points_m, triangle = even_points(vertices_m, triangles, 5000, np.random.default_rng(7))
+    areas, normals = triangle_areas_and_normals(vertices_m, triangles)
+    container = Surface(wall.vertices_m, wall.triangles).distance(points_m) < 1e-4
+    rim = container & (lip_distance(wall.lip_edge_m, points_m) <= RIM_M)
+    parts = np.column_stack([container, rim, ~container])
+    return Cloud(
+        "target", points_m, normals[triangle], np.full(len(points_m), areas.sum() / len(points_m)), parts
+    )
+
+
+def looks_like(body: Cloud, chosen: np.ndarray, part: int) -> Cloud:
+    """Return a cloud of which the classifiers take chosen points for one part (0, 1, 2) alone."""
+    parts = body.parts.copy()
+    parts[chosen] = np.arange(3) == part
+    return replace(body, parts=parts)
+
+
+def mapped(body: Cloud) -> tuple[Mapped, Mapped]:
+    warp = fit(cloud("mug"), body, rng=np.random.default_rng(0), refinements=5, bends=1)
+    return warp.map_cloud(1), warp.map_labels(1)
+
+
+@pytest.mark.parametrize("part", [0, 1, 2])
+def test_an_arch_over_the_opening_is_neither_rim_nor_container(part):
+    """The mug was stretched to the arch's top: its rim was mapped onto the arch, half of it above the true one."""
+    body = target(POT, arch)
+    above = ~body.parts[:, 0] & (body.points_m[:, 2] > HIGH_M + 0.005)
+    assert above.sum() > 150
+    for found in mapped(looks_like(body, ~body.parts[:, 0], part)):
+        rim_m = found.cloud.points_m[found.valid & found.cloud.parts[:, 1]]
+        assert rim_m[:, 2].mean() == pytest.approx(HIGH_M - 0.001, abs=0.002)
+        assert found.cloud.points_m[found.valid & found.cloud.parts.any(axis=1), 2].max() < HIGH_M + 0.006
+    assert not found.cloud.parts[above].any()
+
+
+@pytest.mark.parametrize("part", [0, 1, 2])
+@pytest.mark.parametrize(("more", "least"), [(lugs, 0.9), (long_handle, 0.9)])
+def test_what_sticks_out_of_the_wall_is_no_container(more, least, part):
+    """Lugs and long handles were container or rim, and the hull a fifth to two thirds too large."""
+    body = target(POT, more)
+    out = np.linalg.norm(body.points_m[:, :2], axis=1) > 0.0665
+    assert out.sum() > 150
+    points, labels = mapped(looks_like(body, ~body.parts[:, 0], part))
+    assert (labels.cloud.parts[out, :2].any(axis=1)).mean() < 1.0 - least
+    reached = points.valid & points.cloud.parts[:, :2].any(axis=1)
+    assert (np.linalg.norm(points.cloud.points_m[reached, :2], axis=1) > 0.0665).mean() < 0.01
+    assert labels.cloud.parts[body.parts[:, 0], 0].mean() > 0.995
+
+
+def test_the_rim_of_a_wall_that_looks_like_rim_all_over_is_its_top():
+    """Both sides of a large thin wall are near to each other: it was told to lie on its side."""
+    body = target(POT)
+    frame = part_frame(replace(body, parts=body.parts | [False, True, False]))
+    assert frame.rim_low_m > 0.7 * HIGH_M
+    np.testing.assert_allclose(frame.T_object_part[:3, 0], [0.0, 0.0, 1.0])
+
+
+def test_dividers_do_not_close_the_opening_of_a_dish():
+    """It was told that no ring looks like a rim around an opening."""
+    body = target(DISH)
+    along = np.linspace(-0.09, 0.09, 121)
+    places = [(-2e-3, 8e-3), (-2e-3, 15e-3), (2e-3, 8e-3), (2e-3, 15e-3), (0.0, 18e-3)]
+    more_m = np.vstack([np.column_stack(np.broadcast_arrays(along, y, z)) for y, z in places])
+    facing = np.repeat([[0.0, -1, 0], [0, -1, 0], [0, 1, 0], [0, 1, 0], [0, 0, 1]], len(along), axis=0)
+    parts = np.tile([True, False, False], (len(more_m), 1))
+    more = Cloud("divider", more_m, facing, np.full(len(more_m), 1e-5), parts)
+    both = Cloud("target", *(np.concatenate([getattr(body, a), getattr(more, a)]) for a in ARRAYS))
+    assert part_frame(both).rim_low_m > 0.015
+
+
+def test_a_rim_in_two_pieces_goes_round_together():
+    body = target(POT, lugs)
+    gap = np.abs(body.points_m[:, 1]) < 0.008
+    ring = rim_rings(looks_like(body, gap & body.parts[:, 1], 0))[0]
+    assert ring.coverage > 0.9
+    assert ring.size_m == pytest.approx(0.06, abs=0.003)
+
+
+def test_the_rim_of_a_narrow_opening_is_not_the_belly_below_it():
+    """A cylinder as wide as the belly has its rim there: the radius was 35 to 44 % too large."""
+    for found, within in zip(mapped(target(VASE)), (0.2, 0.1), strict=True):
+        rim = found.valid & found.cloud.parts[:, 1]
+        assert rim.sum() > 30
+        assert np.linalg.norm(found.cloud.points_m[rim, :2], axis=1).mean() == pytest.approx(
+            0.030, rel=within
+        )
