@@ -9,10 +9,10 @@ ROOT_CONFIG = "config/config.yaml"
 
 
 def _refusal(project, *arguments):
-    told = project.call("--dry-run", *arguments)
-    assert told.returncode == 1
-    assert "Traceback" not in told.stdout
-    (sentence,) = [line for line in told.stdout.splitlines() if line.startswith("error: ")]
+    code, said = project.dry_run(*arguments)
+    assert code == 1
+    assert "Traceback" not in said
+    (sentence,) = [line for line in said.splitlines() if line.startswith("error: ")]
     return sentence
 
 
