@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from workflow.conftest import ROOT, finished
+from workflow.conftest import ROOT, copy_of, finished
 
 __all__ = ["finished"]
 
@@ -37,7 +37,7 @@ class Workspace:
 def workspace(finished, tmp_path_factory) -> Workspace:
     """Return a copy of the finished project, its overlay taken into config.yaml, so that commands are typed as they are printed."""
     folder = tmp_path_factory.mktemp("typed") / "project"
-    shutil.copytree(finished.folder, folder, symlinks=True)
+    copy_of(finished, folder)
     for name in ("Makefile", "pyproject.toml", "requirements.txt"):
         shutil.copy2(ROOT / name, folder)
     shutil.copytree(ROOT / "benchmarks", folder / "benchmarks", dirs_exist_ok=True)

@@ -1,5 +1,7 @@
 """Views without poses: registered to within twice the errors of posed fusion; what no view can tell is said."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from fuse import writers
@@ -17,9 +19,23 @@ RINGS_DEG = ((25.0, 4), (52.0, 8))
 
 def record(folder, name: str, options: str = "", colour=None, lug=()) -> np.ndarray:
     """Write views of an object on the table without their poses, perhaps with colours, and return the poses (N, 4, 4)."""
+    recorded = seen(name, lug)
+    writers.seven_scenes(folder, recorded)
+    for path in folder.glob("*.pose.txt"):
+        path.unlink()
+    for i, (depth, T) in enumerate(recorded if colour else []):
+        Image.fromarray(colour(depth, T)).save(folder / f"frame-{i:06d}.color.png")
+    if options:
+        (folder / "scan.yaml").write_text(options)
+    return np.stack([T for _, T in recorded])
+
+
+@cache
+def seen(name: str, lug: tuple) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return depths (H, W) in mm and T_world_camera of views from two rings, perhaps with a `box` at the object."""
     body = shape(name)
     cup = frames.apply(T_WORLD_OBJECT, body.vertices_m), body.triangles
-    scene = camera.Scene([cup, recording.table(), *lug])
+    scene = camera.Scene([cup, recording.table(), *([box(*lug)] if lug else [])])
     target, recorded = T_WORLD_OBJECT[:3, 3] + [0, 0, body.height_m / 2], []
     for elevation, count in RINGS_DEG:
         for k in range(count):
@@ -29,14 +45,7 @@ def record(folder, name: str, options: str = "", colour=None, lug=()) -> np.ndar
             recorded.append(
                 (camera.depth_image(scene, T, camera.Noise(1.0), np.random.default_rng(len(recorded))), T)
             )
-    writers.seven_scenes(folder, recorded)
-    for path in folder.glob("*.pose.txt"):
-        path.unlink()
-    for i, (depth, T) in enumerate(recorded if colour else []):
-        Image.fromarray(colour(depth, T)).save(folder / f"frame-{i:06d}.color.png")
-    if options:
-        (folder / "scan.yaml").write_text(options)
-    return np.stack([T for _, T in recorded])
+    return recorded
 
 
 def paint(depth_mm: np.ndarray, T_world_camera: np.ndarray) -> np.ndarray:
@@ -129,7 +138,7 @@ def box(width_m: float, wide_m: float, high_m: float, at: tuple[float, float, fl
 
 
 def test_a_lug_that_tells_no_turns_is_not_lost(tmp_path):
-    record(tmp_path, "small_cup", lug=[box(0.015, 0.010, 0.005, (0.034, 0.0, 0.05))])
+    record(tmp_path, "small_cup", lug=(0.015, 0.010, 0.005, (0.034, 0.0, 0.05)))
     with pytest.raises(
         PipelineError,
         match="more than 5 mm off one, as a small handle is, or views that do not fit; add poses",

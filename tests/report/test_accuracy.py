@@ -1,29 +1,24 @@
 """From the ten noisy scans to warped parameters by the real workflow, against the objects' known geometry."""
 
-import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from workflow.conftest import ROOT, new_project
 
 from pipeline.report.accuracy import errors, label_scores
 from pipeline.report.metrics import accuracy_metrics, warp_metrics
 
-ROOT = Path(__file__).parents[2]
 NAMES = yaml.safe_load((ROOT / "config/config.yaml").read_text())["scan"]["objects"]
 
 
 @pytest.fixture(scope="module")
 def metrics(tmp_path_factory) -> dict[str, float]:
     folder = tmp_path_factory.mktemp("accuracy")
-    for part in ("config", "workflow", "profiles", "src"):
-        shutil.copytree(ROOT / part, folder / part)
-    shutil.copy2(ROOT / "Snakefile", folder)
-    (folder / "data/raw").mkdir(parents=True)
+    new_project(folder)
     targets = [f"data/processed/warp/mug/{name}/alignment.json" for name in NAMES]
     targets += ["data/processed/parametrise/mug/parameters.parquet"]
     call = [sys.executable, "-m", "snakemake", "-c2", *targets, "--config", "track={enabled: false}"]

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
+from sharing import made_once
 
 from pipeline.geometry.cavity import cavity
 from pipeline.simulate.liquid import Vessel, vessel
@@ -21,27 +22,32 @@ def revolved(name: str, inner_m: list[tuple[float, float]], wall_m: float, foot_
     return vessel(cavity(np.asarray(mesh.vertices), np.asarray(mesh.faces), name=name), SPACING_M)
 
 
+def _once(factory: pytest.TempPathFactory, name: str, *shape) -> Vessel:
+    """Return `revolved`, which takes seconds, as the first process that tests has made it."""
+    return made_once(factory, name, lambda: revolved(name, *shape))
+
+
 @pytest.fixture(scope="session")
-def cylinder() -> Vessel:
+def cylinder(tmp_path_factory) -> Vessel:
     """Inner radius 37 mm, inner depth 97 mm, wall 3 mm: the cup of the reference pour."""
-    return revolved("cylinder", [(0.0, 0.0), (0.037, 0.0), (0.037, 0.097)], 0.003, 0.040)
+    return _once(tmp_path_factory, "cylinder", [(0.0, 0.0), (0.037, 0.0), (0.037, 0.097)], 0.003, 0.040)
 
 
 @pytest.fixture(scope="session")
-def thin() -> Vessel:
+def thin(tmp_path_factory) -> Vessel:
     """The same with a wall of 1.5 mm."""
-    return revolved("thin", [(0.0, 0.0), (0.037, 0.0), (0.037, 0.097)], 0.0015, 0.0385)
+    return _once(tmp_path_factory, "thin", [(0.0, 0.0), (0.037, 0.0), (0.037, 0.097)], 0.0015, 0.0385)
 
 
 @pytest.fixture(scope="session")
-def cone() -> Vessel:
+def cone(tmp_path_factory) -> Vessel:
     """Inner radius from 25 mm to 45 mm over 80 mm."""
-    return revolved("cone", [(0.0, 0.0), (0.025, 0.0), (0.045, 0.080)], 0.003, 0.028)
+    return _once(tmp_path_factory, "cone", [(0.0, 0.0), (0.025, 0.0), (0.045, 0.080)], 0.003, 0.028)
 
 
 @pytest.fixture(scope="session")
-def bowl() -> Vessel:
+def bowl(tmp_path_factory) -> Vessel:
     """Half a sphere of radius 60 mm inside."""
     angle = np.linspace(0.0, np.pi / 2, 24)
     inner = [(0.06 * np.sin(a), 0.06 * (1 - np.cos(a))) for a in angle]
-    return revolved("bowl", inner, 0.003, 0.063)
+    return _once(tmp_path_factory, "bowl", inner, 0.003, 0.063)

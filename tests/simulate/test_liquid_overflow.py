@@ -1,3 +1,5 @@
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ ROOMS = (6, 10, 15, 20)
 SEEDS = range(1, 25)
 
 
+@cache
 def taken_before_it_overflows(
     vessel: Vessel, room: int, seed: int, most: int = 40, wait_s: float = 0.1
 ) -> int:

@@ -10,7 +10,7 @@ from simulate.test_trials import lathe, prepare
 from pipeline import artefacts
 from pipeline.geometry.cavity import lip_alone, pour_axis
 from pipeline.simulate import __main__ as trials_command
-from pipeline.simulate import convergence, measures, physics
+from pipeline.simulate import convergence, measures, physics, rest
 from pipeline.simulate.fields import precompute
 from pipeline.simulate.liquid import Vessel
 from pipeline.simulate.references import THIN_M, references
@@ -67,6 +67,8 @@ def test_pouring_begins_where_hydrostatics_says_and_nearer_at_half_the_spacing(r
     """Within 3° or one spacing held back at the lip at 10 mm, within half of that at 5 mm; the threshold is 1 ml at both."""
     vessel = request.getfixturevalue(name)
     fine = precompute(vessel.cavity, vessel.spacing_m / 2, vessel.lowered)
+    # What runs over later, which is long to find with so many particles, moves nothing here: the fullest start is 90 %.
+    rest._made_once(fine, rest.BRIMFUL, lambda: rest._topped(fine))
     for share in physics.FILLS:
         (spill, allowed), (finer, _) = (measures.spill_angle(name, v, share, 4) for v in (vessel, fine))
         bar = max(np.radians(3.0), allowed["measured"])

@@ -63,6 +63,49 @@ def test_comments_docstrings_and_layout_do_not(source, text):
     assert Code(source).hash("pipeline.a") == before
 
 
+NESTED = """
+async def asked():
+    async for _ in water():
+        async with water():
+            {}
+class Well:
+    def draw(self, pails):
+        for pail in pails:
+            while pail:
+                {}
+        else:
+            {}
+        match pails:
+            case []:
+                {}
+        try:
+            {}
+        except* OSError:
+            {}
+        finally:
+            if pails:
+                {}
+            else:
+                {}
+"""
+
+
+@pytest.mark.parametrize("place", range(NESTED.count("{}")))
+def test_imports_and_docstrings_are_found_in_every_statement_that_holds_others(source, place):
+    def written(line: str) -> str:
+        return NESTED.format(*(line if number == place else "pass" for number in range(NESTED.count("{}"))))
+
+    part = source / "pipeline/b/__main__.py"
+    part.write_text(written("from pipeline import helper"))
+    assert "pipeline.helper" in Code(source).modules("pipeline.b")
+    part.write_text(written("def inner(): 'Doc.'; return 1"))
+    before = Code(source).hash("pipeline.b")
+    part.write_text(written("def inner(): 'Another.'; return 1"))
+    assert Code(source).hash("pipeline.b") == before
+    part.write_text(written("def inner(): 'Another.'; return 2"))
+    assert Code(source).hash("pipeline.b") != before
+
+
 def test_a_missing_stage_is_named(source):
     with pytest.raises(PipelineError, match=r"expected the module pipeline\.c, found none"):
         Code(source).hash("pipeline.c")

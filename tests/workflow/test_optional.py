@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from workflow.conftest import jobs
 from workflow.jobs import OBJECTS, each
 
 from pipeline.artefacts import read_table
@@ -19,17 +20,17 @@ def test_the_pages_on_physics_are_made_when_they_are_asked_for(project):
     engines = {"liquid", "bullet", "bullet_fluid"}
     for key in engines:
         project.configure("simulate.engine", key)
-        told = project.call("-n", "-p", "reports/physics.pdf").stdout
+        told = project.plan("-p", "reports/physics.pdf")
         commands = [line for line in told.splitlines() if "python -m pipeline.simulate " in line]
         for other in engines - {key}:
             assert sum(f"--engine {other} " in line for line in commands) == len(others)
 
 
 def test_ablations_are_made_when_they_are_asked_for_and_reuse_what_their_key_does_not_move(project):
-    planned = project.planned("reports/ablations.pdf")
+    told = project.plan("-p", "reports/ablations.pdf")
+    planned = jobs(told)
     assert {"report_ablations", "ablate_labels wide_bowl"} <= planned
     assert not {job for job in planned if job.split()[0].startswith(("fuse", "label", "simulate", "warp"))}
-    told = project.call("-n", "-p", "reports/ablations.pdf").stdout
     commands = [line for line in told.splitlines() if "python -m pipeline." in line]
     simulated = [line for line in commands if "pipeline.simulate" in line]
     assert len(simulated) == 2 * len(OBJECTS)
@@ -45,9 +46,9 @@ def test_ablations_are_made_when_they_are_asked_for_and_reuse_what_their_key_doe
 
 def test_methods_of_warping_are_compared_when_it_is_asked_for(project):
     targets = OBJECTS - {"mug"}
+    told = project.plan("-p", "reports/warping.pdf")
     compared = each("warp_by", targets) | each("parametrise_by", targets)
-    assert project.planned("reports/warping.pdf") == compared | {"report_warping"}
-    told = project.call("-n", "-p", "reports/warping.pdf").stdout
+    assert jobs(told) == compared | {"report_warping"}
     warps = [line for line in told.splitlines() if "python -m pipeline.warp " in line]
     assert len(warps) == len(METHODS) * len(targets)
     learning = [line for line in warps if "--examples data" in line]

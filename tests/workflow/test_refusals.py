@@ -2,6 +2,7 @@
 
 import pytest
 import yaml
+from workflow.conftest import jobs
 
 from pipeline.scan.shapes import NAMES
 
@@ -9,11 +10,21 @@ ROOT_CONFIG = "config/config.yaml"
 
 
 def _refusal(project, *arguments):
-    told = project.call("--dry-run", *arguments)
-    assert told.returncode == 1
-    assert "Traceback" not in told.stdout
-    (sentence,) = [line for line in told.stdout.splitlines() if line.startswith("error: ")]
+    code, said = project.dry_run(*arguments)
+    assert code == 1
+    assert "Traceback" not in said
+    (sentence,) = [line for line in said.splitlines() if line.startswith("error: ")]
     return sentence
+
+
+def test_a_dry_run_of_the_tests_is_that_of_the_program(fresh):
+    """They call it in a process that has it loaded."""
+    told = fresh.call("--dry-run")
+    assert (told.returncode, jobs(told.stdout)) == (0, fresh.planned())
+    fresh.configure("fuse.points", 10)
+    told, sentence = fresh.call("--dry-run"), _refusal(fresh)
+    assert told.returncode == 1
+    assert sentence in told.stdout.splitlines()
 
 
 @pytest.mark.parametrize(

@@ -93,9 +93,9 @@ def _convergence(options: argparse.Namespace, pair: "tuple[Vessel, Vessel]") -> 
         trial = convergence.trial_of(found)
         rows += convergence.pouring(name, pair, trial, options.threshold)
     fillings = artefacts.read_table(options.filling, "trials").head(n)
-    held = {}
+    held = {name: pair}
     for cup_name, path in map(command.name_and_path, options.held):
-        if cup_name in set(fillings["held_object"]):
+        if cup_name in set(fillings["held_object"]) - {name}:
             cup = _cavity(cup_name, path)
             held[cup_name] = (vessel(cup, options.spacing_m), vessel(cup, options.spacing_m / 2))
     for found in command.progress(fillings.itertuples(), len(fillings), f"filling {name} again"):
