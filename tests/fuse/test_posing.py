@@ -54,6 +54,19 @@ def test_views_of_a_round_object_by_a_camera_that_is_askew_are_refined_and_keep_
     assert room.capacity_m3 == pytest.approx(shape("small_cup").capacity_m3, rel=0.03)
 
 
+def test_depths_that_are_too_long_are_told_beside_poses_that_were_refined():
+    """The poses came to fit depths that are 2 % too long, and the cup to hold 6 % more: it was said of the poses alone."""
+    given, _ = scenes.views(shape("small_cup"), 14)
+    found = located(replace(given, depths_m=[np.float32(1.02) * depth for depth in given.depths_m]))
+    assert found.depths_too_long == pytest.approx(0.02, abs=0.003)
+    assert "too long, and it holds 6% too much" in recorded.complaints(found.facts())[1]
+    facts = {"poses": "refined", "poses_off_m": 0.001, "table_spread_m": 0.001}
+    assert len(recorded.complaints(facts | {"depths_too_long": 0.004})) == 1
+    assert (
+        "too short, and it holds 4% too little" in recorded.complaints(facts | {"depths_too_long": -0.014})[1]
+    )
+
+
 def test_what_a_view_shows_of_the_table_stands_it_upright():
     rng = np.random.default_rng(0)
     level = np.column_stack([rng.uniform(-0.15, 0.15, (2000, 2)), rng.normal(0.0, 0.001, 2000)])

@@ -118,8 +118,9 @@ def complaints(
         )
     if open_below_m is not None:
         told.append(
-            f"it was found to hold nothing, as its inside is open below {open_below_m * 1e3:.0f} mm above the table: it has holes, "
-            "or its wall is too thin for this camera there; record more views from nearer, or drop a mesh of it"
+            f"it may be found to hold nothing, as its inside is open to the side below {open_below_m * 1e3:.0f} mm above the "
+            "table: it has holes, or its wall is too thin for this camera there; record more views, from nearer and with the "
+            "camera's filling of holes off, or drop a mesh of it"
         )
     return told
 

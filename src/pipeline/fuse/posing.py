@@ -73,6 +73,21 @@ def _moved_m(views: Views, posed: Views, place: Placement) -> float:
     return float(np.median(np.linalg.norm(moves, axis=2).mean(axis=1)))
 
 
+def too_long(given: Views, posed: Views) -> float:
+    """Return by which share depths are too long if the way that all cameras went back along their axes is no error of their poses.
+
+    That way is told apart from a shift of all together, and from one across the axes.
+    """
+    before = dict(zip(given.names, given.T_world_cameras, strict=True))
+    ways = [
+        T[:3, 3] - before[each][:3, 3] for each, T in zip(posed.names, posed.T_world_cameras, strict=True)
+    ]
+    terms = [np.hstack([np.eye(3), T[:3, :3]]) for T in posed.T_world_cameras]
+    along_m = np.linalg.lstsq(np.concatenate(terms), np.concatenate(ways), rcond=None)[0][5]
+    middles_m = np.stack([T[:3, 3] for T in posed.T_world_cameras]) - table.focus(posed)
+    return -float(along_m / np.median(np.linalg.norm(middles_m, axis=1)))
+
+
 def shown_again(views: Views, place: Placement) -> Placement:
     """Return where the object stands, as before, with the points that the refined views show there."""
     x, y, z = places = frames.apply(place.T_object_world, table.world_points(views).places_m).T

@@ -12,6 +12,8 @@ from pipeline.fuse.raw import Views
 from pipeline.fuse.table import Placement, Plane
 
 NOISY_M = 0.0025  # standard deviation: with 3.2 mm, 36 views do not hold a wall of 3.5 mm together; with 2.1 mm they do
+# A Kinect's depths are off by 1 %, arms' cameras by some millimetres: from here on capacities are off by 3 % if it is the depths.
+MUCH_TOO_LONG = 0.009
 LEAST_SEEN, LOW_SHARE = 0.85, 0.1  # of the surface higher than this share of the object
 
 
@@ -19,7 +21,7 @@ LEAST_SEEN, LOW_SHARE = 0.85, 0.1  # of the surface higher than this share of th
 class Located:
     """Views that fit together, the table and the object on it; left_out: names of the views that do not fit;
     registration: how poses were found, empty where they were given; poses_off_m: by how much they were off as given, and whether
-    they were refined."""
+    they were refined; depths_too_long: by which share depths are, if that is why they were off along the cameras' axes."""
 
     views: Views
     plane: Plane
@@ -28,6 +30,7 @@ class Located:
     registration: dict[str, Any]
     poses_off_m: float | None = None
     is_refined: bool = False
+    depths_too_long: float | None = None
 
     @cached_property
     def spread_m(self) -> float:
@@ -52,6 +55,7 @@ class Located:
             "eyes_object_m": eyes,
             "poses": "registered" if self.registration else "refined" if self.is_refined else "given",
             "poses_off_m": self.poses_off_m,
+            "depths_too_long": self.depths_too_long,
             "colours_differ": views.colours_differ,
             **self.registration,
         }
@@ -68,6 +72,7 @@ def complaints(facts: dict[str, Any]) -> list[str]:
             f"the poses are off by {1e3 * off_m:.1f} mm, by the table in each view; they were {done}; "
             "calibrate the camera's pose better"
         )
+    told.extend(_of_depths(facts.get("depths_too_long") or 0.0))
     by_poses, spread_m = off_m > posing.OFF_M and as_given, facts["table_spread_m"]
     if spread_m > NOISY_M and not by_poses:
         told.append(
@@ -90,6 +95,18 @@ def complaints(facts: dict[str, Any]) -> list[str]:
     return told
 
 
+def _of_depths(too_long: float) -> list[str]:
+    """Return a sentence where the poses were off along the cameras' axes by so large a share of the distance."""
+    if abs(too_long) < MUCH_TOO_LONG:
+        return []
+    where, length, much = ("back", "long", "much") if too_long > 0 else ("forward", "short", "little")
+    return [
+        f"all cameras were moved {where} along their axes, by {abs(too_long):.1%} of the distance: if the poses were right there, "
+        f"depths are so much too {length}, and it holds {3 * abs(too_long):.0%} too {much}; measure its height, and correct "
+        "`depth_scale:` in scan.yaml if it is off"
+    ]
+
+
 def located(views: Views, name: str, rng: np.random.Generator) -> Located:
     """Return the views in one world, with the table and the object; a `PipelineError` names the folder and what is wrong."""
     if views.options.on_table is False:
@@ -108,9 +125,11 @@ def located(views: Views, name: str, rng: np.random.Generator) -> Located:
     refined = posing.refined(views, place, name, rng) if off_m > posing.OFF_M else None
     if refined is None:
         return scan
-    views, unseen = refined
+    posed, unseen = refined
+    too_long, views = posing.too_long(views, posed), posed
     place = posing.shown_again(views, place)
-    return replace(scan, views=views, placement=place, left_out=left_out + unseen, is_refined=True)
+    scan = replace(scan, views=views, placement=place, left_out=left_out + unseen, is_refined=True)
+    return replace(scan, depths_too_long=too_long)
 
 
 def check_registered(scan: Located, vertices_m: np.ndarray, seen: np.ndarray, name: str) -> None:

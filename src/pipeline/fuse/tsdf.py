@@ -27,6 +27,7 @@ LEAST_VOTES, PRIOR_VOTES, UNSEEN_VOTE = 0.2, 0.5, 0.1
 LEAST_WEIGHT = 0.3  # of the cosines under which pixels saw a vertex, for it to count as seen: one view at 70°
 # Up to this height a torn foot is closed by the table. Open below by less than `LEAST_DRAIN_M2` are corners.
 FOOT_M, LEAST_DRAIN_M2 = 0.004, 0.0001
+_LEVEL = np.pad(ndimage.generate_binary_structure(2, 1)[..., None], ((0, 0), (0, 0), (1, 1)))
 _AROUND = 2  # voxels around one, to which its value is drawn
 
 
@@ -36,7 +37,7 @@ class Surface:
 
     seen (V,): by a camera, not closed by us. inner (V,): at the cavity, which is every place walled in on its level.
     table_closed_m2: area of the cavity's floor that is the table. thickened_share: of the outside, where the wall was too thin.
-    open_below_m: the height below which the cavity is open, or None where it holds liquid.
+    open_below_m: the height below which the cavity is open to the side, or None where it is closed.
     """
 
     vertices_m: np.ndarray
@@ -184,19 +185,22 @@ def enclosed(free: np.ndarray) -> np.ndarray:
 
     A pinhole in the wall is no way: ways are at least three voxels wide.
     """
-    level = np.zeros((3, 3, 3), bool)
-    level[:, :, 1] = ndimage.generate_binary_structure(2, 1)
-    wide = ndimage.binary_erosion(free, level, border_value=1)
-    labels, count = ndimage.label(wide, level)
-    outside = np.zeros(count + 1, bool)
-    outside[0] = True
-    for side in (labels[0], labels[-1], labels[:, 0], labels[:, -1]):
-        outside[side.ravel()] = True
-    rooms, count = ndimage.label(~outside[labels])
+    inside, _ = _ways(free)
+    rooms, count = ndimage.label(inside)
     if count == 0:
         return np.zeros_like(free)
     sizes = np.bincount(rooms.ravel())
-    return ndimage.binary_dilation(rooms == sizes[1:].argmax() + 1, level) & free
+    return ndimage.binary_dilation(rooms == sizes[1:].argmax() + 1, _LEVEL) & free
+
+
+def _ways(free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return which free voxels (nx, ny, nz) with free ones beside them have no way to the border in their layer, and which have."""
+    labels, count = ndimage.label(ndimage.binary_erosion(free, _LEVEL, border_value=1), _LEVEL)
+    outside = np.zeros(count + 1, bool)
+    for side in (labels[0], labels[-1], labels[:, 0], labels[:, -1]):
+        outside[side.ravel()] = True
+    outside[0] = False
+    return (labels > 0) & ~outside[labels], outside[labels]
 
 
 def closed_by_table(
@@ -208,8 +212,9 @@ def closed_by_table(
     """
     closed, open_from = np.zeros_like(free), None
     closed[:, :, floor] = walled_in[:, :, floor]
+    _, outside = _ways(free)
     for z in range(floor + 1, free.shape[2]):
-        drains = walled_in[:, :, z] & free[:, :, z - 1] & ~walled_in[:, :, z - 1]
+        drains = walled_in[:, :, z] & outside[:, :, z - 1]
         if np.count_nonzero(drains) * voxel_m**2 < LEAST_DRAIN_M2:
             continue
         if (z - floor + 1) * voxel_m > FOOT_M:
