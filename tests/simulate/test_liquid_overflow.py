@@ -35,8 +35,8 @@ def taken_before_it_overflows(
 TOO_LITTLE = pytest.mark.xfail(reason="the lattice of the top layer takes some of what falls in")
 
 
-# Of bowls whose vertices are a nanometre elsewhere, as other roundings are, three of four miss it at some free room, by 6 at most: a
-# layer of theirs has 113 particles, the cylinder's 43, and of the few states that begin so near the brim one is like the next.
+# Of bowls whose vertices are a nanometre elsewhere, as with other roundings, three of four miss it at some free room, by 6 at most:
+# a layer of theirs has 113 particles, the cylinder's 43, and all seeds begin from the same few states at the brim.
 BY_CHANCE = pytest.mark.xfail(reason="which of the bowl's states at the brim are made is chance, and few")
 
 
