@@ -27,7 +27,6 @@ LEAST_VOTES, PRIOR_VOTES, UNSEEN_VOTE = 0.2, 0.5, 0.1
 LEAST_WEIGHT = 0.3  # of the cosines under which pixels saw a vertex, for it to count as seen: one view at 70°
 # Up to this height a torn foot is closed by the table. Open below by less than `LEAST_DRAIN_M2` are corners.
 FOOT_M, LEAST_DRAIN_M2 = 0.004, 0.0001
-_LEVEL = np.pad(ndimage.generate_binary_structure(2, 1)[..., None], ((0, 0), (0, 0), (1, 1)))
 _AROUND = 2  # voxels around one, to which its value is drawn
 
 
@@ -73,12 +72,12 @@ def fuse(
     value, measured = _field(seen_by, placement.points_m, lowest, covered, voxel_m, truncation_m)
     heights_m = (lowest[2] + np.arange(value.shape[2])) * voxel_m
     value -= np.float32(_excess_m(heights_m, voxel_m) / truncation_m)
-    walled_in = enclosed(value > 0)
+    walled_in, outside = enclosed(value > 0)
     without_shadow = completed(value, measured, walled_in, voxel_m, truncation_m)
     if without_shadow is not None:
-        value, walled_in = without_shadow, enclosed(without_shadow > 0)
+        value, (walled_in, outside) = without_shadow, enclosed(without_shadow > 0)
     floor = _table_layers(voxel_m) - lowest[2]
-    closed, open_from = closed_by_table(walled_in, value > 0, floor, voxel_m)
+    closed, open_from = closed_by_table(walled_in, outside, floor, voxel_m)
     value[closed] = -1.0
     table_closed_m2 = float(closed.any(axis=2).sum()) * voxel_m**2
     open_below_m = None if open_from is None else float((open_from + lowest[2]) * voxel_m)
@@ -187,40 +186,36 @@ def regularised(value: np.ndarray, weight: np.ndarray) -> np.ndarray:
     return np.where(around(weight) >= LEAST_VOTES, drawn, -1.0)
 
 
-def enclosed(free: np.ndarray) -> np.ndarray:
-    """Return the largest room of free voxels (nx, ny, nz) that are walled in on their level: no way to the border in a layer.
+def enclosed(free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the largest room of free voxels (nx, ny, nz) walled in on their level, and those with a way to the border in a layer.
 
     A pinhole in the wall is no way: ways are at least three voxels wide.
     """
-    inside, _ = _ways(free)
-    rooms, count = ndimage.label(inside)
-    if count == 0:
-        return np.zeros_like(free)
-    sizes = np.bincount(rooms.ravel())
-    return ndimage.binary_dilation(rooms == sizes[1:].argmax() + 1, _LEVEL) & free
-
-
-def _ways(free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return which free voxels (nx, ny, nz) with free ones beside them have no way to the border in their layer, and which have."""
-    labels, count = ndimage.label(ndimage.binary_erosion(free, _LEVEL, border_value=1), _LEVEL)
-    outside = np.zeros(count + 1, bool)
+    level = np.zeros((3, 3, 3), bool)
+    level[:, :, 1] = ndimage.generate_binary_structure(2, 1)
+    labels, count = ndimage.label(ndimage.binary_erosion(free, level, border_value=1), level)
+    is_outside = np.zeros(count + 1, bool)
     for side in (labels[0], labels[-1], labels[:, 0], labels[:, -1]):
-        outside[side.ravel()] = True
-    outside[0] = False
-    return (labels > 0) & ~outside[labels], outside[labels]
+        is_outside[side.ravel()] = True
+    is_inside = ~is_outside
+    is_inside[0] = is_outside[0] = False
+    rooms, count = ndimage.label(is_inside[labels])
+    if count == 0:
+        return np.zeros_like(free), is_outside[labels]
+    largest = np.bincount(rooms.ravel())[1:].argmax() + 1
+    return ndimage.binary_dilation(rooms == largest, level) & free, is_outside[labels]
 
 
 def closed_by_table(
-    walled_in: np.ndarray, free: np.ndarray, floor: int, voxel_m: float
+    walled_in: np.ndarray, outside: np.ndarray, floor: int, voxel_m: float
 ) -> tuple[np.ndarray, int | None]:
     """Return the voxels (nx, ny, nz) that become solid so that the table closes the cavity, and the layer below which it is open.
 
     It reaches down to the table's layer `floor`, or to a foot that noise tore, whose lowest layers let it out sideways.
     """
-    closed, open_from = np.zeros_like(free), None
+    closed, open_from = np.zeros_like(walled_in), None
     closed[:, :, floor] = walled_in[:, :, floor]
-    _, outside = _ways(free)
-    for z in range(floor + 1, free.shape[2]):
+    for z in range(floor + 1, walled_in.shape[2]):
         drains = walled_in[:, :, z] & outside[:, :, z - 1]
         if np.count_nonzero(drains) * voxel_m**2 < LEAST_DRAIN_M2:
             continue
