@@ -11,10 +11,9 @@ from pipeline.fuse.together import ALIKE, HOLD, HOLD_GIVEN_TURN, LEAST_FACING, N
 
 SAMPLES, OTHERS = 250, 10  # points of each view, and views that each of them is looked for in
 ABOVE_M = 0.010  # what is lower may be the table
-# Of a view's points others look through so many, or it through theirs. Of right poses' up to 16 %, with twice the noise 25; of one
-# that is off by 20 mm 71 % and more.
-THROUGH_M, ASTRAY = 0.010, 0.6
-
+# Of a view's points others look through so many, or it through theirs: with right poses up to 16 %, 25 with twice the noise; of one
+# that is off by 20 mm 71 % and more. Of few points that is chance.
+THROUGH_M, ASTRAY, FEW = 0.010, 0.6, 30
 HELD = np.diag(HOLD + [HOLD_GIVEN_TURN, 0.0, 0.0])
 
 
@@ -26,42 +25,52 @@ def off_m(seen_by: Planes, place: Placement, rng: np.random.Generator) -> float:
     """
     n = len(seen_by.view)
     points, normals, view = _sampled(seen_by, place, rng)
-    asked = np.argsort(rng.random((n, n)) + np.eye(n), axis=1)[:, :OTHERS]
-    is_asked = np.zeros((n, n), bool)
-    np.put_along_axis(is_asked, asked, values=True, axis=1)
-    np.fill_diagonal(is_asked, val=False)
-    left, right, seen, through = np.zeros((n, 3, n, 3)), np.zeros((n, 3)), np.zeros(n), np.zeros(n)
-    left[np.arange(n), :, np.arange(n)] = HELD * (np.bincount(view, minlength=n) + 1)[:, None, None]
+    is_asked, met, seen, through = _asked(n, rng), [], np.zeros(n), np.zeros(n)
     for j in range(n):
-        looked_for = np.flatnonzero(is_asked[view, j])
-        apart_m, is_found, is_through, facing = _met(seen_by, j, points[looked_for], normals[looked_for])
-        own = view[looked_for]
+        of = np.flatnonzero(is_asked[view, j])
+        apart_m, is_found, is_through, facing = _met(seen_by, j, points[of], normals[of])
         for total, is_counted in ((through, is_through), (seen, is_through | is_found)):
-            total += np.bincount(own[is_counted], minlength=n)
+            total += np.bincount(view[of[is_counted]], minlength=n)
             total[j] += np.count_nonzero(is_counted)
-        own, apart_m, motion = (
-            own[is_found],
-            apart_m[is_found],
-            motions(points[looked_for[is_found]], facing[is_found]),
-        )
-        weight = 1 / (1 + (apart_m / ROBUST_M) ** 2)
-        pull = _by_view(own, weight[:, None] * motion * apart_m[:, None], n)
-        square = _by_view(
-            own, (weight[:, None, None] * motion[:, :, None] * motion[:, None]).reshape(-1, 9), n
-        )
-        square = square.reshape(n, 3, 3)
+        found = of[is_found]
+        met.append((view[found], apart_m[is_found], motions(points[found], facing[is_found])))
+    counts = np.bincount(view, minlength=n)
+    turn, dx, dy = _steps(met, counts)[view].T
+    moved = (dx - turn * points[:, 1]) ** 2 + (dy + turn * points[:, 0]) ** 2
+    squares = np.bincount(view, moved, n) / np.maximum(counts, 1)
+    is_astray = (through > ASTRAY * seen) & (seen > FEW)
+    squares = np.where(is_astray, np.maximum(squares, NEAR_M**2), squares)
+    return float(np.sqrt(squares[seen > 0].mean())) if seen.any() else 0.0
+
+
+def _asked(n: int, rng: np.random.Generator) -> np.ndarray:
+    """Return in which other views (n, n) the points of each are looked for."""
+    chosen = np.argsort(rng.random((n, n)) + np.eye(n), axis=1)[:, : min(OTHERS, n - 1)]
+    is_asked = np.zeros((n, n), bool)
+    np.put_along_axis(is_asked, chosen, values=True, axis=1)
+    return is_asked
+
+
+def _steps(met: list[tuple[np.ndarray, np.ndarray, np.ndarray]], counts: np.ndarray) -> np.ndarray:
+    """Return turn and shift (V, 3) of each view, of `counts` points, that bring points to where they are met.
+
+    met: for each view, of the points that it meets, the view that they are from, their ways (M,) and motions (M, 3). A way is what
+    the points' view and the one that meets them move relative to each other.
+    """
+    n = len(met)
+    left, right = np.zeros((n, 3, n, 3)), np.zeros((n, 3))
+    left[np.arange(n), :, np.arange(n)] = HELD * (counts + 1)[:, None, None]
+    for j, (own, apart_m, motion) in enumerate(met):
+        weighted = motion / (1 + (apart_m / ROBUST_M) ** 2)[:, None]
+        pull = _by_view(own, weighted * apart_m[:, None], n)
+        square = _by_view(own, (weighted[:, :, None] * motion[:, None]).reshape(-1, 9), n).reshape(n, 3, 3)
         right += pull
         right[j] -= pull.sum(axis=0)
         left[np.arange(n), :, np.arange(n)] += square
         left[j, :, j] += square.sum(axis=0)
         left[:, :, j] -= square
         left[j] -= square.transpose(1, 0, 2)
-    steps = np.linalg.solve(left.reshape(3 * n, 3 * n), right.ravel()).reshape(n, 3)
-    turn, dx, dy = steps[view].T
-    moved = (dx - turn * points[:, 1]) ** 2 + (dy + turn * points[:, 0]) ** 2
-    squares = np.bincount(view, moved, n) / np.maximum(np.bincount(view, minlength=n), 1)
-    squares = np.where(through > ASTRAY * seen, np.maximum(squares, NEAR_M**2), squares)
-    return float(np.sqrt(squares[seen > 0].mean())) if seen.any() else 0.0
+    return np.linalg.solve(left.reshape(3 * n, 3 * n), right.ravel()).reshape(n, 3)
 
 
 def _by_view(view: np.ndarray, values: np.ndarray, n: int) -> np.ndarray:
@@ -103,7 +112,7 @@ def _met(
     first, width, height = seen_by.view[j]
     x, y, z = seen_by.projection[j] @ np.column_stack([points, np.ones(len(points))]).T
     u, v = np.rint(np.stack([x, y]) / z).astype(int)
-    inside = (u >= 0) & (v >= 0) & (u < width) & (v < height)
+    inside = (z > 0) & (u >= 0) & (v >= 0) & (u < width) & (v < height)
     plane = seen_by.plane[first + np.where(inside, v * width + u, 0)].astype(float)
     facing, cosine = plane[:, :3], np.where(inside, plane[:, 4], 0.0)
     apart_m = plane[:, 3] - np.einsum("nc,nc->n", facing, points)
