@@ -62,6 +62,7 @@ def folder(tmp_path_factory):
             "share_seen": 0.9,
             "watertight": True,
             "residual_m": {"median": 0.0006},
+            "complaints": ["the floor was poorly seen", "depth is noisy"] if name == "jug" else [],
         }
         write_json(folder / f"fuse/{name}/fusion.json", fusion)
         mapping = truth.assign(source_index=0, target_index=0, valid=True)[TABLES["mapping"].names]
@@ -266,9 +267,16 @@ def test_uncertainties_are_said_to_the_decimals_of_their_column(folder, tmp_path
     assert not any(one["std"] for one in jug["parameters"])
 
 
+def test_what_fuse_complains_of_is_on_the_page(browser, page):
+    with opened(browser, page) as tab:
+        told = tab.page.locator("#objects-table ~ p").all_inner_texts()
+    assert told[0] == "jug, of its scan: the floor was poorly seen. depth is noisy."
+    assert not any("mug, of its scan" in words for words in told)
+
+
 def test_a_scan_without_views_is_told_as_what_it_is():
     told = scan({"layout": "mesh", "n_views": 0, "share_seen": 1.0, "watertight": False, "residual_m": {}})
-    assert told == {"kind": "mesh", "seen": "–", "median": "–", "closed": "not closed"}
+    assert told == {"kind": "mesh", "seen": "–", "median": "–", "closed": "not closed", "complaints": []}
 
 
 def test_links_lead_to_the_runs_and_name_what_they_show():

@@ -1,7 +1,7 @@
 """From a raw folder to the surface, the cloud and the report of what was found."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,15 +24,16 @@ _RESIDUAL_POINTS = 8_000
 
 @dataclass(frozen=True)
 class Fused:
-    """mesh: vertices (V, 3) and triangles (F, 3), object frame; cloud: table `cloud`; report: content of fusion.json.
-
-    complaints: what a user should know of the scan, a sentence each.
-    """
+    """mesh: vertices (V, 3) and triangles (F, 3), object frame; cloud: table `cloud`; report: content of fusion.json."""
 
     mesh: Mesh
     cloud: Columns
     report: dict[str, Any]
-    complaints: tuple[str, ...] = ()
+
+    @property
+    def complaints(self) -> tuple[str, ...]:
+        """What a user should know of the scan, a sentence each."""
+        return tuple(self.report["complaints"])
 
 
 def fused(
@@ -55,8 +56,8 @@ def fused(
         vertices, triangles, T_object_world, facts = dropped.read(raw, rng)
         every = np.ones(len(vertices), bool)
         surface = tsdf.Surface(vertices, triangles, every, ~every)
-        result = _result(surface, n_points, False, rng, facts | _mesh_facts(T_object_world, raw))
-        return replace(result, complaints=tuple(dropped.complaints(facts)))
+        facts |= {"complaints": dropped.complaints(facts)}
+        return _result(surface, n_points, False, rng, facts | _mesh_facts(T_object_world, raw))
     tell("poses, table and object")
     scan = recorded.located(raw, str(folder), rng)
     tell("the surface")
@@ -79,7 +80,7 @@ def fused(
         surface.table_closed_m2,
         surface.open_below_m,
     )
-    return replace(_result(surface, n_points, True, rng, facts), complaints=tuple(told))
+    return _result(surface, n_points, True, rng, facts | {"complaints": told})
 
 
 def _result(

@@ -9,7 +9,10 @@ from pipeline.pour.project import Project
 from pipeline.predictions import MAPPINGS, PARAMETERS
 
 PARTS = ("container", "rim", "handle")
-SCAN = ("layout", "n_views", "poses", "share_seen", "seen", "residual_m", "watertight", "views_left_out")
+SCAN = (
+    *("layout", "n_views", "poses", "share_seen", "seen", "residual_m", "watertight", "views_left_out"),
+    "complaints",
+)
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -77,7 +80,7 @@ def _scan(scan: dict[str, Any]) -> list[str]:
         lines.append(
             f"  fits to     {residual['median'] * 1e3:.1f} mm (median), {residual['quantile_95'] * 1e3:.1f} mm (95 %)"
         )
-    return lines
+    return lines + [f"  told        {complaint}" for complaint in scan.get("complaints", [])]
 
 
 def _shares(parts: dict[str, float] | None) -> list[str]:

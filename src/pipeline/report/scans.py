@@ -1,5 +1,7 @@
-"""Draw one object's scan on a page: its surface from four sides, sections through the walls, the views and the residuals."""
+"""Draw one object's scan on a page: its surface from four sides, sections through the walls, the views, the residuals, and what
+fuse complains of."""
 
+import textwrap
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,9 +20,9 @@ SIDES = (
     (-60.0, 70.0, "from above"),
     (-60.0, -35.0, "from below"),
 )
-PIXELS = 260
+PIXELS, CHARACTERS = 260, 165  # of a side's edge; of a line of text
 SEEN_RGB, UNSEEN_RGB = (0.34, 0.71, 0.91), (0.90, 0.62, 0.0)  # Okabe and Ito's sky blue and orange
-LINE, MARK = "#0072B2", "#D55E00"
+LINE, MARK, TOLD = "#0072B2", "#D55E00", "#8A3A00"
 
 
 def main() -> None:
@@ -74,6 +76,11 @@ def draw(
         _views(figure.add_subplot(grid[1, 2], projection="polar"), facts)
         _residuals(figure.add_subplot(grid[1, 3]), facts)
         figure.suptitle(f"{name.replace('_', ' ')}: {summary(seen, facts)}", fontsize=9)
+        told = [f"! {complaint}" for complaint in facts.get("complaints", [])]
+        figure.supxlabel(
+            "\n".join(textwrap.fill(line, CHARACTERS, subsequent_indent="  ") for line in told),
+            **{"x": 0.01, "horizontalalignment": "left", "fontsize": 8.5, "color": TOLD},
+        )
     return figure
 
 

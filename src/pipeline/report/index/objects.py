@@ -72,8 +72,8 @@ def _small(value: float, decimals: int) -> str:
     return f"{value:.{decimals}f}" if value >= least / 2 else f"< {least:.{decimals}f}"
 
 
-def scan(fusion: dict[str, Any]) -> dict[str, str]:
-    """Return in words what the scan is, how much of the surface was seen and how near the measured points are to it."""
+def scan(fusion: dict[str, Any]) -> dict[str, Any]:
+    """Return in words what the scan is, how much of the surface was seen, how near measured points are to it, and complaints."""
     residual = fusion.get("residual_m") or {}
     views = fusion.get("n_views") or 0
     return {
@@ -81,4 +81,5 @@ def scan(fusion: dict[str, Any]) -> dict[str, str]:
         "seen": f"{fusion['share_seen']:.0%}" if views and "share_seen" in fusion else "–",
         "median": f"{1e3 * residual['median']:.2f} mm" if "median" in residual else "–",
         "closed": "closed" if fusion.get("watertight") else "not closed",
+        "complaints": fusion.get("complaints", []),
     }
