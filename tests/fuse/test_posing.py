@@ -62,12 +62,34 @@ def test_depths_that_are_too_long_are_told_beside_poses_that_were_refined():
     given, _ = scenes.views(shape("small_cup"), 14)
     found = located(replace(given, depths_m=[np.float32(1.02) * depth for depth in given.depths_m]))
     assert found.depths_too_long == pytest.approx(0.02, abs=0.003)
-    assert "too long, and it holds 6% too much" in recorded.complaints(found.facts())[1]
-    facts = {"poses": "refined", "poses_off_m": 0.001, "table_spread_m": 0.001}
+    told = recorded.complaints(found.facts())[1]
+    assert "too long, and it holds 6% too much" in told
+    assert float(told.split("depth_scale: ")[1].split("`")[0]) == pytest.approx(1020, abs=3)
+    facts = {"poses": "refined", "poses_off_m": 0.001, "table_spread_m": 0.001, "depth_scale": 1000.0}
     assert len(recorded.complaints(facts | {"depths_too_long": 0.004})) == 1
     assert (
         "too short, and it holds 4% too little" in recorded.complaints(facts | {"depths_too_long": -0.014})[1]
     )
+
+
+@pytest.mark.parametrize("elevation_deg", [30.0, 60.0])
+@pytest.mark.parametrize("too_long", [0.0, 0.01])
+def test_one_ring_of_cameras_tells_depths_from_poses(elevation_deg, too_long):
+    """Where they hardly do, poses off at random by 1.5 mm were 3 % of depth. One view is astray."""
+    rng, views = np.random.default_rng(1), scenes.views(shape("small_cup"), 14)[0]
+    given, posed = [], []
+    for azimuth in np.linspace(0, 2 * np.pi, 14, endpoint=False):
+        down = np.pi / 2 + np.radians(elevation_deg + rng.normal(0, 1))
+        R = Rotation.from_euler("ZX", [azimuth, -down]).as_matrix()
+        eye = -0.6 * R[:, 2]
+        given.append(frames.transform(R, eye))
+        posed.append(frames.transform(R, eye - 0.6 * too_long * R[:, 2] + rng.normal(0, 0.0015, 3)))
+    posed[3] = frames.transform(posed[3][:3, :3], posed[3][:3, 3] + [0.05, 0.0, 0.0])
+    names, middle = [str(i) for i in range(14)], np.full((14, 9, 9), np.float32(0.6))
+    views = replace(views, depths_m=list(middle), names=names, T_world_cameras=given)
+    views = replace(views, intrinsics=np.tile([[9.0, 0, 4], [0, 9, 4], [0, 0, 1]], (14, 1, 1)))
+    found = posing.too_long(views, replace(views, T_world_cameras=posed))
+    assert 0.5 * too_long - 0.002 < found < too_long + 0.002
 
 
 def test_what_a_view_shows_of_the_table_stands_it_upright():

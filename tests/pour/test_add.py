@@ -67,7 +67,7 @@ def test_another_depth_scale_is_an_option(project, recorded, tmp_path, capsys):
     assert _added(project, capsys, scan, "--depth-scale", "5000")["views_left_out"] == []
 
 
-def test_what_fuse_would_complain_of_is_said_at_once(project, recorded, tmp_path, capsys):
+def test_poses_and_meshes_that_fuse_would_complain_of_are_told_at_once(project, recorded, tmp_path, capsys):
     """Of a recording, and of a mesh; they were left to the log of the workflow."""
     scan, pot = tmp_path / "scan", tmp_path / "pot.stl"
     moved = np.eye(4)

@@ -70,6 +70,7 @@ def fused(
         "seen": shares,
         "floor_closed_by_table_m2": surface.table_closed_m2,
         "wall_thickened_share": surface.thickened_share,
+        "open_below_m": surface.open_below_m,
     }
     lowest_m = float(surface.vertices_m[:, 2].min())
     told = recorded.complaints(facts) + coverage.complaints(

@@ -1,6 +1,6 @@
 """Depth images on their way to fusion: poses checked, or found where there are none; table and object found."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -15,14 +15,16 @@ from pipeline.fuse.table import Placement, Plane
 NOISY_M = 0.0025  # standard deviation: with 3.2 mm, 36 views do not hold a wall of 3.5 mm together; with 2.1 mm they do
 # A Kinect's depths are off by 1 %, arms' cameras by some millimetres: from here on capacities are off by 3 % if it is the depths.
 MUCH_TOO_LONG = 0.009
+LEAST_ASTRAY_M = 0.005
 LEAST_SEEN, LOW_SHARE = 0.85, 0.1  # of the surface higher than this share of the object
 
 
 @dataclass(frozen=True)
 class Located:
     """Views that fit together and their planes, the table and the object on it; left_out: names of the views that do not fit;
-    registration: how poses were found, empty where they were given; poses_off_m: by how much they were off as given, and whether
-    they were refined; depths_too_long: by which share depths are, if that is why they were off along the cameras' axes."""
+    registration: how poses were found, empty where they were given; poses_off_m: by how much they were off as given, all but
+    those of the views astray, and whether they were refined; depths_too_long: by which share depths are, if that is why they were
+    off along the cameras' axes."""
 
     views: Views
     plane: Plane
@@ -31,6 +33,7 @@ class Located:
     left_out: list[str]
     registration: dict[str, Any]
     poses_off_m: float | None = None
+    astray: tuple[str, ...] = ()
     is_refined: bool = False
     depths_too_long: float | None = None
 
@@ -57,7 +60,9 @@ class Located:
             "eyes_object_m": eyes,
             "poses": "registered" if self.registration else "refined" if self.is_refined else "given",
             "poses_off_m": self.poses_off_m,
+            "views_astray": list(self.astray),
             "depths_too_long": self.depths_too_long,
+            "depth_scale": views.depth_scale,
             "colours_differ": views.colours_differ,
             **self.registration,
         }
@@ -67,14 +72,20 @@ def complaints(facts: dict[str, Any]) -> list[str]:
     """Return a sentence each: views that do not fit, colours that were not used, poses that are off, depth too noisy for walls."""
     told = []
     off_m, as_given = facts["poses_off_m"] or 0.0, facts["poses"] == "given"
+    refused = "fused as given, as too little is seen to refine them"
+    done = refused if as_given else "refined on table and object"
     if off_m > posing.OFF_M:
-        refused = "fused as given, as too little is seen to refine them"
-        done = refused if as_given else "refined on table and object"
         told.append(
             f"the poses are off by {1e3 * off_m:.1f} mm, by table and object in each view; they were {done}; "
             "calibrate the camera's pose better"
         )
-    told.extend(_of_depths(facts.get("depths_too_long") or 0.0))
+    if astray := facts.get("views_astray"):
+        told.append(
+            f"{_named(astray)}: off by {1e3 * LEAST_ASTRAY_M:.0f} mm or more along the table; poses were {done}; correct these, "
+            "or remove the views"
+        )
+    if abs(too_long := facts.get("depths_too_long") or 0.0) > MUCH_TOO_LONG:
+        told.append(_of_depths(too_long, facts["depth_scale"]))
     by_poses, spread_m = off_m > posing.OFF_M and as_given, facts["table_spread_m"]
     if spread_m > NOISY_M and not by_poses:
         told.append(
@@ -87,9 +98,8 @@ def complaints(facts: dict[str, Any]) -> list[str]:
             "foot of its own, a scan cannot tell: drop a mesh of it"
         )
     if left_out := [*facts.get("views_left_out", []), *facts.get("views_without_object", [])]:
-        shown = ", ".join(left_out[:3]) + (f" and {len(left_out) - 3} more" if len(left_out) > 3 else "")
         cure = "remove them" if facts["poses"] == "registered" else "correct their poses or remove them"
-        told.append(f"{shown}: left out, as they do not fit the other views or show no object; {cure}")
+        told.append(f"{_named(left_out)}: left out, as they do not fit the other views or show no object; {cure}")
     if facts.get("colours_differ"):
         told.append(
             "colours were not used to find poses, as their images are of another size than depth; align colour to depth"
@@ -97,16 +107,18 @@ def complaints(facts: dict[str, Any]) -> list[str]:
     return told
 
 
-def _of_depths(too_long: float) -> list[str]:
-    """Return a sentence where the poses were off along the cameras' axes by so large a share of the distance."""
-    if abs(too_long) < MUCH_TOO_LONG:
-        return []
+def _named(views: list[str]) -> str:
+    return ", ".join(views[:3]) + (f" and {len(views) - 3} more" if len(views) > 3 else "")
+
+
+def _of_depths(too_long: float, depth_scale: float) -> str:
+    """Return a sentence on poses that were off along the cameras' axes by so large a share of the distance."""
     where, length, much = ("back", "long", "much") if too_long > 0 else ("forward", "short", "little")
-    return [
+    return (
         f"all cameras were moved {where} along their axes, by {abs(too_long):.1%} of the distance: if the poses were right there, "
-        f"depths are so much too {length}, and it holds {3 * abs(too_long):.0%} too {much}; measure its height, and correct "
-        "`depth_scale:` in scan.yaml if it is off"
-    ]
+        f"depths are so much too {length}, and it holds {3 * abs(too_long):.0%} too {much}; measure it, and if it is not as high "
+        f"as this, write `depth_scale: {depth_scale * (1 + too_long):.5g}` into scan.yaml"
+    )
 
 
 def located(views: Views, name: str, rng: np.random.Generator) -> Located:
@@ -120,26 +132,23 @@ def located(views: Views, name: str, rng: np.random.Generator) -> Located:
         views, found = registration.registered(views, name, rng)
     views, left_out = agreement.checked(views, name, rng, are_given=not found)
     plane, place = placement.find(views, name, rng)
-    scan = Located(views, plane, place, planes(views, place), left_out, found)
+    seen_by = planes(views, place)
     if found:
-        return scan
+        return Located(views, plane, place, seen_by, left_out, found)
     aside = rng.spawn(1)[0]  # what is drawn later stays as it is
-    off_m = max(posing.off_m(views, place), sliding.off_m(scan.seen_by, place, aside))
-    scan = replace(scan, poses_off_m=off_m)
-    refined = posing.refined(views, place, name, rng) if off_m > posing.OFF_M else None
-    if refined is None:
-        return scan
-    posed, unseen = refined
-    place = posing.shown_again(posed, place)
-    return replace(
-        scan,
-        views=posed,
-        placement=place,
-        seen_by=planes(posed, place),
-        left_out=left_out + unseen,
-        is_refined=True,
-        depths_too_long=posing.too_long(views, posed),
-    )
+    off_m, is_astray = sliding.off(seen_by, place, aside)
+    off_m = max(posing.off_m(views, place), off_m)
+    astray = tuple(view for view, is_off in zip(views.names, is_astray, strict=True) if is_off)
+    told = {"poses_off_m": off_m, "astray": astray}
+    if off_m > posing.OFF_M or astray:
+        del seen_by  # much, of many views
+        refined = posing.refined(views, place, name, rng)
+        if refined is not None:
+            posed, unseen = refined
+            told |= {"is_refined": True, "depths_too_long": posing.too_long(views, posed)}
+            views, place, left_out = posed, posing.shown_again(posed, place), left_out + unseen
+        seen_by = planes(views, place)
+    return Located(views, plane, place, seen_by, left_out, found, **told)
 
 
 def check_registered(scan: Located, vertices_m: np.ndarray, seen: np.ndarray, name: str) -> None:

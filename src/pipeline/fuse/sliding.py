@@ -14,14 +14,16 @@ ABOVE_M = 0.010  # what is lower may be the table
 # Of a view's points others look through so many, or it through theirs: with right poses up to 16 %, 25 with twice the noise; of one
 # that is off by 20 mm 71 % and more. Of few points that is chance.
 THROUGH_M, ASTRAY, FEW = 0.010, 0.6, 30
+MOST_ASTRAY = 0.2  # of the views
 HELD = np.diag(HOLD + [HOLD_GIVEN_TURN, 0.0, 0.0])
 
 
-def off_m(seen_by: Planes, place: Placement, rng: np.random.Generator) -> float:
-    """Return how far the poses are off along the table, where the object is: root mean square over the views.
+def off(seen_by: Planes, place: Placement, rng: np.random.Generator) -> tuple[float, np.ndarray]:
+    """Return how far poses are off along the table, at the object, and which (V,) are astray: by about `NEAR_M` or more.
 
-    Right poses are off by 0.08 to 0.17 mm; an axis or views that are off by 1 mm, by 0.6 to 1.5. A view that is astray counts as
-    `NEAR_M`, as its points find nothing near enough.
+    How far is the root mean square over views that are not astray, as the points of those find nothing near enough to say. Where more
+    than a fifth would be, it is no single ones, and they count as `NEAR_M`. Right poses are off by 0.08 to 0.17 mm; an axis or
+    views that are off by 1 mm, by 0.6 to 1.5.
     """
     n = len(seen_by.view)
     points, normals, view = _sampled(seen_by, place, rng)
@@ -39,8 +41,10 @@ def off_m(seen_by: Planes, place: Placement, rng: np.random.Generator) -> float:
     moved = (dx - turn * points[:, 1]) ** 2 + (dy + turn * points[:, 0]) ** 2
     squares = np.bincount(view, moved, n) / np.maximum(counts, 1)
     is_astray = (through > ASTRAY * seen) & (seen > FEW)
-    squares = np.where(is_astray, np.maximum(squares, NEAR_M**2), squares)
-    return float(np.sqrt(squares[seen > 0].mean())) if seen.any() else 0.0
+    if is_astray.mean() > MOST_ASTRAY:
+        squares[is_astray], is_astray = np.maximum(squares[is_astray], NEAR_M**2), np.zeros(n, bool)
+    telling = (seen > 0) & ~is_astray
+    return float(np.sqrt(squares[telling].mean())) if telling.any() else 0.0, is_astray
 
 
 def _asked(n: int, rng: np.random.Generator) -> np.ndarray:

@@ -219,7 +219,7 @@ def closed_by_table(
         drains = walled_in[:, :, z] & outside[:, :, z - 1]
         if np.count_nonzero(drains) * voxel_m**2 < LEAST_DRAIN_M2:
             continue
-        if (z - floor + 1) * voxel_m > FOOT_M:
+        if (z - floor + 1) * voxel_m > max(FOOT_M, 2 * voxel_m):
             open_from = z
         else:
             closed[:, :, floor:z] |= drains[..., None]

@@ -17,6 +17,7 @@ from pipeline.geometry.surface import Surface, subdivided
 TIE_M = 0.002  # rims that are level to within this count as level
 _BED = 16  # a spout's bed is looked for in heights averaged over an eighth of the turn: this share to either side
 _LOWER = 3  # cells: a room that overflows so much lower than another is one of the same container
+_COMPARTMENT = 0.2  # of the largest room: a smaller one is a pocket beside it
 _LEAST_M3 = 5e-6  # a container that keeps less than 5 ml is none
 
 Quadrature = tuple[np.ndarray, np.ndarray, float]
@@ -204,7 +205,7 @@ def _pool(free: np.ndarray, cell: float, name: str) -> tuple[np.ndarray, int]:
         sizes = np.bincount(labels.ravel(), minlength=count + 1)
         sizes[[0, labels[0, 0, 0]]] = 0
         largest = max(largest, int(sizes.max()))
-        holds = sizes * cell**3 >= _LEAST_M3
+        holds = sizes * cell**3 >= max(_LEAST_M3, _COMPARTMENT * sizes.max() * cell**3)
         level = level or layer * bool(holds.any())
         pool[:, :, : layer + 1] |= holds[labels]
         if layer == level - _LOWER:

@@ -34,8 +34,9 @@ def rim_and_opening(
     centre = _middle(pool[:, :, level], axes)
     bottom = np.nonzero(pool.any(axis=(0, 1)))[0][0]
     first, lowest_m = max(level - 5, bottom), max(axes[2][level] - 5 * cell, axes[2][bottom])
-    is_divided = False
-    for _ in range(3):
+    is_divided, turns = False, 3
+    while turns:
+        turns -= 1
         i, j = np.clip(
             np.rint((centre - [axes[0][0], axes[1][0]]) / cell).astype(int), 0, np.array(pool.shape[:2]) - 1
         )
@@ -45,7 +46,8 @@ def rim_and_opening(
         hidden = is_divided or (len(clear) == 0 and _is_wide(pool[:, :, first], i, j))
         from_m = _reach(pool[:, :, first], axes, centre, cell) if hidden else 0.0
         rim = _rim_about(surface, centre, start, top_m, from_m, name)
-        is_divided = is_divided or _share_outside(pool[:, :, first], axes, rim, cell) > _MOST_OUTSIDE
+        if not is_divided and _share_outside(pool[:, :, first], axes, rim, cell) > _MOST_OUTSIDE:
+            is_divided, turns = True, 3
         centre = _middle(pool[:, :, first], axes) if is_divided else rim[:, :2].mean(axis=0)
     return rim, rim.mean(axis=0)
 
