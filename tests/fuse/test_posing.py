@@ -35,7 +35,7 @@ def test_poses_of_a_shaky_arm_are_refined(scan, name):
     assert found.facts()["poses"] == "refined"
     by_table_m = posing.off_m(shaken, placement.find(shaken, name, np.random.default_rng(2))[1])
     assert by_table_m == pytest.approx(0.0027, abs=0.0007)
-    assert by_table_m <= found.poses_off_m < 2 * by_table_m
+    assert 0.99 * by_table_m < found.poses_off_m < 2 * by_table_m
     assert "refined on table and object" in recorded.complaints(found.facts())[0]
     surface = tsdf.fuse(found.views, found.placement, 0.00125, 0.0025, name)
     room = cavity(surface.vertices_m, surface.triangles, name=name)

@@ -58,7 +58,9 @@ def test_such_poses_are_refined(scan, is_astray):
     moved = scenes.one_moved(views, 0.1) if is_astray else scenes.off_axis(views, axis_m, 0.002)
     found = recorded.located(moved, "scan", np.random.default_rng(2))
     told = recorded.complaints(found.facts())[0]
-    assert told.startswith(f"{views.names[-1]}: off by 5 mm or more" if is_astray else "the poses are off by ")
+    assert told.startswith(
+        f"{views.names[-1]}: off by 5 mm or more" if is_astray else "the poses are off by "
+    )
     assert found.left_out == (views.names[-1:] if is_astray else [])
     surface = tsdf.fuse(found.views, found.placement, 0.00125, 0.0025, "mug")
     room = cavity(surface.vertices_m, surface.triangles, name="mug")

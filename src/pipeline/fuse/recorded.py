@@ -99,7 +99,9 @@ def complaints(facts: dict[str, Any]) -> list[str]:
         )
     if left_out := [*facts.get("views_left_out", []), *facts.get("views_without_object", [])]:
         cure = "remove them" if facts["poses"] == "registered" else "correct their poses or remove them"
-        told.append(f"{_named(left_out)}: left out, as they do not fit the other views or show no object; {cure}")
+        told.append(
+            f"{_named(left_out)}: left out, as they do not fit the other views or show no object; {cure}"
+        )
     if facts.get("colours_differ"):
         told.append(
             "colours were not used to find poses, as their images are of another size than depth; align colour to depth"
@@ -139,7 +141,7 @@ def located(views: Views, name: str, rng: np.random.Generator) -> Located:
     off_m, is_astray = sliding.off(seen_by, place, aside)
     off_m = max(posing.off_m(views, place), off_m)
     astray = tuple(view for view, is_off in zip(views.names, is_astray, strict=True) if is_off)
-    told = {"poses_off_m": off_m, "astray": astray}
+    told: dict[str, Any] = {"poses_off_m": off_m, "astray": astray}
     if off_m > posing.OFF_M or astray:
         del seen_by  # much, of many views
         refined = posing.refined(views, place, name, rng)

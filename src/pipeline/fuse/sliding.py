@@ -21,9 +21,9 @@ HELD = np.diag(HOLD + [HOLD_GIVEN_TURN, 0.0, 0.0])
 def off(seen_by: Planes, place: Placement, rng: np.random.Generator) -> tuple[float, np.ndarray]:
     """Return how far poses are off along the table, at the object, and which (V,) are astray: by about `NEAR_M` or more.
 
-    How far is the root mean square over views that are not astray, as the points of those find nothing near enough to say. Where more
-    than a fifth would be, it is no single ones, and they count as `NEAR_M`. Right poses are off by 0.08 to 0.17 mm; an axis or
-    views that are off by 1 mm, by 0.6 to 1.5.
+    How far is the root mean square over views that are not astray, as the points of those find nothing near enough to say.
+    Where more than a fifth would be, it is no single ones, and they count as `NEAR_M`. Right poses are off by 0.08 to 0.17 mm; an
+    axis or views that are off by 1 mm, by 0.6 to 1.5.
     """
     n = len(seen_by.view)
     points, normals, view = _sampled(seen_by, place, rng)
