@@ -5,13 +5,14 @@ import numpy as np
 from pipeline.warp.alignment import PartFrame
 from pipeline.warp.clouds import Cloud
 from pipeline.warp.components import components
-from pipeline.warp.ring import SECTORS, Ring, is_edge, rim_rings
+from pipeline.warp.ring import INNER, SECTORS, STICKS_OUT, Ring, is_edge, rim_rings
 from pipeline.warp.roll import GAP, outside_wall, standing_off
 
 # Shares: of all points, that a piece has at least; of a turn, that it takes at most; of its own, that look into the container.
 LEAST_SHARE, WIDEST, INSIDE = 0.005, 0.4, 0.1
-GROUND_M = 0.002  # what comes so near to the table is a foot
-# Of the ring's radius: what is higher above it is no rim; what is further from its edge, neither.
+# What comes so near to the table, with its middle within this share of the height, is a foot; a handle may reach as far down.
+GROUND_M, LOW = 0.002, 0.25
+# Of the ring's radius: what is higher above it may be overhead; what is further from its edge is no rim.
 ABOVE, NEAR_RIM = 0.05, 0.25
 
 
@@ -25,7 +26,7 @@ def foreign(target: Cloud, frame: PartFrame, source: Cloud) -> np.ndarray:
         return np.zeros(len(target.points_m), dtype=bool)
     own = rim_ring(source)
     found = _overhead(target, ring)
-    if own is not None and _overhead(source, own).any():
+    if own is not None and _overhead(source, own).mean() > LEAST_SHARE:
         found[:] = False
     has_handle = bool(frame.handles) and source.parts[:, 2].any()
     for rows in _sticking_out(target, ring, frame.T_object_part[:3, 3]):
@@ -44,7 +45,7 @@ def rim_ring(cloud: Cloud) -> Ring | None:
 
 
 def near_rim(points_m: np.ndarray, ring: Ring | None) -> np.ndarray:
-    """Return which points (N, 3) may be of a ring's rim: all, where it is not known."""
+    """Return which points (N,) of (N, 3), object frame, may be of a ring's rim: all, where it is not known."""
     if ring is None:
         return np.ones(len(points_m), dtype=bool)
     distance_m, above_m, sector = ring.seen(points_m)
@@ -52,8 +53,17 @@ def near_rim(points_m: np.ndarray, ring: Ring | None) -> np.ndarray:
 
 
 def _overhead(cloud: Cloud, ring: Ring) -> np.ndarray:
-    """Return which points (N,) are above the opening, as those of an arch, a bail, or a handle that rises above the rim."""
-    return ring.seen(cloud.points_m)[1] > ABOVE * ring.size_m
+    """Return which points (N,) are above the opening, as those of an arch, a bail, or a handle that rises above the rim.
+
+    What rises from the wall and neither reaches over the opening nor far out is a lip that is raised for pouring.
+    """
+    distance_m, above_m, sector = ring.seen(cloud.points_m)
+    out = distance_m / ring.radius_m[sector]
+    found = np.zeros(len(out), dtype=bool)
+    for rows in components(cloud, above_m > ABOVE * ring.size_m):
+        nearest, farthest = out[rows].min(), out[rows].max()
+        found[rows] = nearest < INNER or nearest > 1.0 + GAP or farthest > STICKS_OUT
+    return found
 
 
 def _sticking_out(cloud: Cloud, ring: Ring, origin_m: np.ndarray) -> list[np.ndarray]:
@@ -64,12 +74,14 @@ def _sticking_out(cloud: Cloud, ring: Ring, origin_m: np.ndarray) -> list[np.nda
     off, outward = standing_off(cloud, origin_m)
     distance_m, above_m, sector = ring.seen(cloud.points_m)
     off &= distance_m > (1.0 + GAP) * ring.radius_m[sector]
-    low_m = cloud.points_m[:, 2].min()
+    height_m = cloud.points_m[:, 2] - cloud.points_m[:, 2].min()
+    low_m = LOW * (ring.points_m[:, 2].mean() - cloud.points_m[:, 2].min())
     found = []
     for rows in components(cloud, off):
         few = len(rows) < LEAST_SHARE * len(off)
         wide = len(np.unique(sector[rows])) > WIDEST * SECTORS
-        if few or wide or cloud.points_m[rows, 2].min() < low_m + GROUND_M:
+        foot = height_m[rows].min() < GROUND_M and height_m[rows].mean() < low_m
+        if few or wide or foot:
             continue
         inside = (
             (outward[rows] < -0.5) & (above_m[rows] < 0.0) & ~outside_wall(cloud, rows, origin_m, outward)
