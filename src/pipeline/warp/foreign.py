@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from pipeline.warp.alignment import PartFrame
-from pipeline.warp.clouds import Cloud
+from pipeline.warp.alignment import PartFrame, part_frame
+from pipeline.warp.clouds import Cloud, subset
 from pipeline.warp.components import components
 from pipeline.warp.ring import INNER, SECTORS, STICKS_OUT, Ring, is_edge, rim_rings
 from pipeline.warp.roll import GAP, outside_wall, standing_off
@@ -16,26 +16,33 @@ GROUND_M, LOW = 0.002, 0.25
 ABOVE, NEAR_RIM = 0.05, 0.25
 
 
-def foreign(target: Cloud, frame: PartFrame, source: Cloud) -> np.ndarray:
-    """Return which points (M,) of a target with a part frame a source cannot have.
+def foreign(target: Cloud, source: Cloud) -> np.ndarray:
+    """Return which points (M,) of a target, all of it, a source cannot have.
 
     What is above the opening, where nothing is above its own; what sticks out of the wall, but a handle for its own to go to.
     """
-    ring = rim_ring(target)
+    found = np.zeros(len(target.points_m), dtype=bool)
+    ring, own = rim_ring(target), rim_ring(source)
     if ring is None:
-        return np.zeros(len(target.points_m), dtype=bool)
-    own = rim_ring(source)
-    found = _overhead(target, ring)
+        return found
+    over = _overhead(target, ring)
     if own is not None and _overhead(source, own).mean() > LEAST_SHARE:
-        found[:] = False
-    has_handle = bool(frame.handles) and source.parts[:, 2].any()
-    for rows in _sticking_out(target, ring, frame.T_object_part[:3, 3]):
-        towards = target.points_m[rows].mean(axis=0) - frame.T_object_part[:3, 3]
-        is_met = has_handle and towards @ frame.T_object_part[:3, 1] > np.cos(np.pi / 4) * np.linalg.norm(
-            towards[:2]
-        )
-        found[rows] |= not is_met
+        over[:] = False
+    for _ in range(2):  # what is foreign draws the container's middle to itself: once with it, once without
+        frame = part_frame(subset(target, ~found))
+        found = over.copy()
+        for rows in _sticking_out(target, ring, frame.T_object_part[:3, 3]):
+            found[rows] |= not (source.parts[:, 2].any() and _is_handle(target, rows, frame))
+        if not found.any():
+            break
     return found
+
+
+def _is_handle(cloud: Cloud, rows: np.ndarray, frame: PartFrame) -> bool:
+    """Return whether a piece is where a part frame has a handle, if it has one."""
+    towards = cloud.points_m[rows].mean(axis=0) - frame.T_object_part[:3, 3]
+    ahead = towards @ frame.T_object_part[:3, 1]
+    return bool(frame.handles) and bool(ahead > np.cos(np.pi / 4) * np.linalg.norm(towards[:2]))
 
 
 def rim_ring(cloud: Cloud) -> Ring | None:
@@ -71,7 +78,7 @@ def _sticking_out(cloud: Cloud, ring: Ring, origin_m: np.ndarray) -> list[np.nda
 
     A part of the wall, such as the spout of a jug, looks into the container; a foot stands on the table.
     """
-    off, outward = standing_off(cloud, origin_m)
+    off, outward, _ = standing_off(cloud, origin_m)
     distance_m, above_m, sector = ring.seen(cloud.points_m)
     off &= distance_m > (1.0 + GAP) * ring.radius_m[sector]
     height_m = cloud.points_m[:, 2] - cloud.points_m[:, 2].min()
