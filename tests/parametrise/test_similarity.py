@@ -20,7 +20,7 @@ from pipeline.parametrise.cloud import warped
 from pipeline.parametrise.parameters import PARAMETERS, evaluate
 from pipeline.scan.shapes import RIM_M, lip_distance, shape
 from pipeline.warp.clouds import Cloud
-from pipeline.warp.nearest_neighbour import fit
+from pipeline.warp.methods import fit
 
 POINTS, NEIGHBOURS = 4000, (20, 40, 100)
 UP = np.array([0.0, 0.0, 1.0])
@@ -58,7 +58,9 @@ def labelled(target: Cloud, source_scale: float = 1.0) -> np.ndarray:
     estimate = learnt().probabilities(neighbourhood_features(target.points_m, NEIGHBOURS)) > 0.5
     source = moved(body("mug"), 0.0, source_scale, (0.0, 0.0, 0.0))
     return (
-        fit(source, replace(target, parts=estimate), rng=np.random.default_rng(0)).map_labels(1).cloud.parts
+        fit("nearest_neighbour", source, replace(target, parts=estimate), rng=np.random.default_rng(0))
+        .map_labels(1)
+        .cloud.parts
     )
 
 

@@ -10,8 +10,9 @@ from warp.bodies import cloud, iou, moved
 
 from pipeline.errors import PipelineError
 from pipeline.geometry.frames import transform
-from pipeline.warp import files, nearest_neighbour
-from pipeline.warp.clouds import Cloud
+from pipeline.warp import files, methods, nearest_neighbour
+from pipeline.warp.clouds import Cloud, subset
+from pipeline.warp.foreign import foreign
 from pipeline.warp.methods import METHODS
 from pipeline.warp.quality import quality
 from pipeline.warp.shape_space import example
@@ -39,9 +40,12 @@ def examples(name: str) -> list[np.ndarray]:
     return [example(source, warp.deformation, warp.source_frame, warp.target_frame) for warp in warps]
 
 
-def fit(method: str, source: Cloud, target: Cloud, seed: int = 5) -> Warp:
-    own = {"examples": examples(source.name)} if method == "shape_space" else {}
-    return METHODS[method](source, target, rng=np.random.default_rng(seed), **own)
+def options(method: str, source: Cloud) -> dict:
+    return {"examples": examples(source.name)} if method == "shape_space" else {}
+
+
+def fit(method: str, source: Cloud, target: Cloud) -> Warp:
+    return methods.fit(method, source, target, rng=np.random.default_rng(5), **options(method, source))
 
 
 @cache
@@ -147,6 +151,19 @@ def test_a_source_without_a_handle_gives_none_and_leaves_out_nothing_but_a_targe
         assert not warp.is_known[true[:, 2]].all()
     if method != "rigid":
         assert iou(found[:, 1], true[:, 1]) > 0.45
+
+
+@every_method
+def test_what_the_source_has_nothing_like_is_left_out_before_the_fit(method):
+    """Only nearest neighbours left it out; and what it was told of was told again, by the frame of the rest."""
+    source, target = body("tall_cup"), cloud("mug", DENSE)
+    warp = fit(method, source, target)
+    rest = subset(target, ~foreign(target, source))
+    assert 0.9 * DENSE < len(rest.points_m) < 0.97 * DENSE
+    alone = METHODS[method](source, rest, rng=np.random.default_rng(5), **options(method, source))
+    np.testing.assert_array_equal(warp.aligned.points_m, alone.aligned.points_m)
+    assert warp.target is target
+    assert warp.is_known.sum() == len(rest.points_m)
 
 
 @pytest.mark.parametrize(("target", "points"), [("wide_bowl", 1500), ("square_bowl", 1500), ("jug", 1000)])

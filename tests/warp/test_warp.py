@@ -10,15 +10,16 @@ from warp.bodies import cloud, iou, moved
 from pipeline.parametrise.cloud import warped
 from pipeline.parametrise.parameters import evaluate
 from pipeline.warp.clouds import Cloud, Mapped
+from pipeline.warp.methods import fit as fit_by
 from pipeline.warp.nearest import agreeing_neighbours, majority_of_neighbours
-from pipeline.warp.nearest_neighbour import fit as fit_by
 from pipeline.warp.quality import quality
 from pipeline.warp.stretch import between_extents, linear
 from pipeline.warp.warp import Warp
 
 
 def fit(source: Cloud, target: Cloud, refinements: int, bends: int = 0) -> Warp:
-    return fit_by(source, target, rng=np.random.default_rng(0), refinements=refinements, bends=bends)
+    own = {"refinements": refinements, "bends": bends}
+    return fit_by("nearest_neighbour", source, target, rng=np.random.default_rng(0), **own)
 
 
 def test_the_stretch_gives_the_container_the_target_s_variances():

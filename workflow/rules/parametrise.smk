@@ -21,7 +21,8 @@ rule parametrise:
         options=options("parametrise", "hull_points"),
         code=code("pipeline.parametrise"),
     shell:
-        "python -m pipeline.parametrise --object {wildcards.object} --point-mapping {input.point:q} --label-mapping {input.label:q}"
+        "python -m pipeline.parametrise --object {wildcards.object} --source {wildcards.source}"
+        " --point-mapping {input.point:q} --label-mapping {input.label:q}"
         " --parameters {output.parameters:q} --tilt-references {output.tilt_references:q} {params.options} > {log:q} 2>&1"
 
 

@@ -27,6 +27,7 @@ def main() -> None:
     """Read both mappings; write one row of parameters and the rim's tilt references for each."""
     parser = command.parser(__doc__)
     parser.add_argument("--object", required=True, help="name of the object")
+    parser.add_argument("--source", default="the source", help="name of what was warped to it")
     for option in ("--point-mapping", "--label-mapping", "--parameters", "--tilt-references"):
         parser.add_argument(option, type=Path, required=True)
     parser.add_argument("--hull-points", type=int, default=8000, help="points that fill the hull")
@@ -57,7 +58,8 @@ def main() -> None:
         rows.append({**head, **values, **centre})
         words = {name: [word] * len(along_rim["x_m"]) for name, word in head.items()}
         references.append({**along_rim, **words})
-    for complaint in complaints(*rows):
+    complaint = disagreement(rows[0], rows[1], options.source)
+    if complaint:
         command.say(f"{options.object}: {complaint}")
     parameters = {column: [row[column] for row in rows] for column in rows[0]}
     write_table(options.parameters, parameters, "parameters")
@@ -65,14 +67,19 @@ def main() -> None:
     write_table(options.tilt_references, together, "tilt_references")
 
 
-def complaints(point: dict[str, Any], label: dict[str, Any]) -> list[str]:
-    """Return what a user should know of the parameters of both mappings, a sentence each: where they do not agree."""
-    return [
-        f"the {what} is {point[key] * scale:.0f} {unit} by point mapping and {label[key] * scale:.0f} {unit} by label mapping: the "
-        "object has little of the source's shape; see its parts in reports/labels.pdf"
+def disagreement(point: dict[str, Any], label: dict[str, Any], source: str) -> str:
+    """Return what a user should know of the parameters of both mappings: on what they do not agree; nothing, where they do."""
+    differ = [
+        f"{what} {point[key] * scale:.0f} and {label[key] * scale:.0f} {unit}"
         for what, (key, scale, unit) in COMPARED.items()
         if abs(point[key] - label[key]) > ALIKE * max(point[key], label[key])
     ]
+    if not differ:
+        return ""
+    return (
+        f"expected point and label mapping to agree within {ALIKE:.0%}, found {', '.join(differ)}: perhaps it has little of the "
+        f"shape of {source}; label mapping is then the nearer, or choose another source"
+    )
 
 
 def _read_off(table: Columns, name: str, hull_points: int) -> tuple[dict[str, float], dict[str, Any]]:

@@ -60,7 +60,7 @@ def _fit(options) -> "tuple[Warp, float]":  # type: ignore[no-untyped-def]
     import numpy as np
 
     from pipeline.warp import files
-    from pipeline.warp.methods import METHODS
+    from pipeline.warp.methods import METHODS, fit
 
     if options.method not in METHODS:
         raise PipelineError(
@@ -73,7 +73,7 @@ def _fit(options) -> "tuple[Warp, float]":  # type: ignore[no-untyped-def]
     }
     rng = np.random.default_rng([options.seed, crc32(target.name.encode())])
     start_s = time.process_time()
-    fitted = METHODS[options.method](source, target, rng=rng, **own.get(options.method, {}))
+    fitted = fit(options.method, source, target, rng=rng, **own.get(options.method, {}))
     return fitted, time.process_time() - start_s
 
 

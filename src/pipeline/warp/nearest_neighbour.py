@@ -29,15 +29,7 @@ def fit(
     target that the source fits as well at another size is the same thing at that size, and its rim is scaled, too.
     With bends, which the paper does not have either, a thin-plate spline then takes the pairs to each other: no factors
     make a bowl of a mug.
-    What the source cannot know of the target (`Warp.is_known`) is left out: a handle, where it has none, an arch over the opening.
     """
-    known = coarse(source, target).is_known
-    seen = target if known.all() else subset(target, np.flatnonzero(known))
-    warp = replace(_fitted(source, seen, refinements, bends), target=target)
-    return replace(warp, diagnostics={"refinements": float(refinements), "bends": float(bends)})
-
-
-def _fitted(source: Cloud, target: Cloud, refinements: int, bends: int) -> Warp:
     warp = coarse(source, target)
     if refinements:
         warp = _refine(warp, refinements)
@@ -46,25 +38,28 @@ def _fitted(source: Cloud, target: Cloud, refinements: int, bends: int) -> Warp:
         warp = replace(warp, deformation=Chain(stretched, _bend(warp, stretched, _with_rim(warp))))
     for _ in range(bends):
         warp = replace(warp, deformation=Chain(stretched, _bend(warp, stretched, pairs(warp))))
-    return warp
+    return replace(warp, diagnostics={"refinements": float(refinements), "bends": float(bends)})
 
 
 def _misses_rim(warp: Warp) -> bool:
     """Return whether most of the source's rim does not go to the target's: on a vase with a narrow opening, to its belly."""
     thin, from_rows, to_rows = pairs(warp)
     rim = thin.source.parts[from_rows, 1]
-    return bool(near_rim(thin.target.points_m[to_rows[rim]], warp.ring).mean() < 0.5)
+    met = near_rim(thin.target.points_m[to_rows[rim]], warp.ring)
+    return bool(np.count_nonzero(met) < 0.5 * len(met) or not len(met))
 
 
 def _with_rim(warp: Warp) -> tuple[Warp, np.ndarray, np.ndarray]:
-    """Return `pairs` of which those of a rim's points are with the other's rim."""
+    """Return `pairs` of which those of a rim's points are with the other's rim, where both have points."""
     thin, from_rows, to_rows = pairs(warp)
-    here, there = thin.source.parts[:, 1], near_rim(thin.target.points_m, warp.ring)
-    others = ~(here[from_rows] | there[to_rows])
-    rims = replace(thin, source=subset(thin.source, here), target=subset(thin.target, there))
+    is_rim, is_near = thin.source.parts[:, 1], near_rim(thin.target.points_m, warp.ring)
+    if not is_rim.any() or not is_near.any():
+        return thin, from_rows, to_rows
+    others = ~(is_rim[from_rows] | is_near[to_rows])
+    rims = replace(thin, source=subset(thin.source, is_rim), target=subset(thin.target, is_near))
     forth, back = point_pairs(rims, 1)[0][:, 0], label_pairs(rims, 1)[0][:, 0]
     met, home = np.flatnonzero(forth >= 0), np.flatnonzero(back >= 0)
-    here, there = np.flatnonzero(here), np.flatnonzero(there)
+    here, there = np.flatnonzero(is_rim), np.flatnonzero(is_near)
     from_rows = np.concatenate([from_rows[others], here[met], here[back[home]]])
     return thin, from_rows, np.concatenate([to_rows[others], there[forth[met]], there[home]])
 

@@ -22,7 +22,11 @@ SURFACE = 0.5  # of the disc within, from where on what covers it closes it
 
 @dataclass(frozen=True)
 class Ring:
-    """A ring of points (M, 3) about `centre_m` (2,); of each of `SECTORS` the height of its top and the distance of that."""
+    """A ring of points (M, 3) about `centre_m` (2,), and what share of the sectors, `coverage`, it goes through.
+
+    Of each of `SECTORS` (S,): `top_m`, how high its top is, or that beside it where it is bridged; `radius_m`, how far from the
+    axis its highest point is.
+    """
 
     points_m: np.ndarray
     centre_m: np.ndarray
@@ -80,6 +84,7 @@ def _open_rings(pieces: list[np.ndarray], cloud: Cloud) -> list[Ring]:
 
 
 def _polar(points_m: np.ndarray, centre_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return of points (N, 3) the distance (N,) from the vertical through (2,), metres, and the sector (N,), 0 to `SECTORS` - 1."""
     offset = points_m[:, :2] - centre_m
     turn = np.arctan2(offset[:, 1], offset[:, 0]) / (2 * np.pi) + 0.5
     return np.linalg.norm(offset, axis=1), np.minimum((turn * SECTORS).astype(int), SECTORS - 1)
@@ -89,13 +94,14 @@ def _ring(piece_m: np.ndarray, middle_m: np.ndarray) -> Ring:
     """Return the ring on top of a piece of points (N, 3) of a container with its middle at (2,); the piece, where that has none."""
     own = _about(piece_m, piece_m[:, :2].mean(axis=0))
     ring = own if own.goes_round else _about(piece_m, middle_m)  # a handle may be more of it than the rim
-    for _ in range(CENTRINGS):
-        on = _is_on(ring, piece_m)
-        if not ring.goes_round or np.count_nonzero(on) < LEAST_POINTS:
+    for left in reversed(range(CENTRINGS + 1)):
+        on_m = piece_m[_is_on(ring, piece_m)]
+        if not ring.goes_round or len(on_m) < LEAST_POINTS:
             return own
-        ring = _about(piece_m, piece_m[on, :2].mean(axis=0))
-    on_m = piece_m[_is_on(ring, piece_m)]
-    return replace(ring, points_m=on_m, radius_m=_about(on_m, ring.centre_m).radius_m)
+        if left:
+            ring = _about(piece_m, on_m[:, :2].mean(axis=0))
+    level = _about(on_m, ring.centre_m)
+    return replace(ring, points_m=on_m, radius_m=level.radius_m, coverage=level.coverage)
 
 
 def _is_on(ring: Ring, points_m: np.ndarray) -> np.ndarray:
@@ -107,8 +113,9 @@ def _is_on(ring: Ring, points_m: np.ndarray) -> np.ndarray:
 
 
 def _about(points_m: np.ndarray, centre_m: np.ndarray) -> Ring:
+    """Return the ring of all of points (N, 3), metres, about the vertical through (2,): their top in each sector."""
     distance_m, sector = _polar(points_m, centre_m)
-    outer = distance_m > INNER * np.median(distance_m)
+    outer = distance_m >= INNER * np.median(distance_m)  # all of a line, the vertical itself
     top_m, radius_m = np.full((2, SECTORS), np.nan)
     for i in np.unique(sector[outer]):
         here = np.flatnonzero(outer & (sector == i))

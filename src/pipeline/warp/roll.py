@@ -11,7 +11,7 @@ from pipeline.warp.components import components
 HANDLE_MIN_SHARE = 0.02
 # Shares of a handle's points that are labelled so, and that face the body from outside; how far off it, of the body's radius.
 LEAST_LABELLED, FACES_BODY, GAP = 0.3, 0.05, 0.05
-LONG = 1.5  # what reaches so many of the body's radii out is no spout of a rim
+LONG = 1.5  # what reaches so many radii of the body out, where that is widest below the rim, is no spout of a rim
 WAY = np.linspace(0.15, 0.9, 26)  # shares of the way from a handle to the axis; its own wall comes before
 ALIKE = 0.8  # a second handle counts as large as the first from here on
 SECTORS, ROUND_SHARE, REPEATS = 72, 0.015, 0.9
@@ -70,9 +70,9 @@ def _handles(cloud: Cloud, origin_m: np.ndarray, ring_m: np.ndarray) -> list[np.
     """
     if not cloud.parts[:, 2].any():
         return []
-    off, outward = standing_off(cloud, origin_m)
-    radius_m = np.linalg.norm((ring_m - origin_m)[:, :2], axis=1).mean()
+    off, outward, body_m = standing_off(cloud, origin_m)
     low_m = rim_low_m(ring_m)
+    size_m = body_m[cloud.points_m[:, 2] <= low_m].max()
     found = []
     for rows in components(cloud, off):
         alike = rows[cloud.parts[rows, 2]]
@@ -81,7 +81,7 @@ def _handles(cloud: Cloud, origin_m: np.ndarray, ring_m: np.ndarray) -> list[np.
         loops = np.mean(outside_wall(cloud, rows, origin_m, outward)) > FACES_BODY
         below = np.mean(cloud.points_m[rows, 2] >= low_m) < FACES_BODY
         reach_m = np.linalg.norm((cloud.points_m[rows] - origin_m)[:, :2], axis=1).max()
-        if loops or below or reach_m > LONG * radius_m:
+        if loops or below or reach_m > LONG * size_m:
             found.append(alike)
     return sorted(found, key=len, reverse=True)
 
@@ -91,15 +91,15 @@ def rim_low_m(ring_m: np.ndarray) -> float:
     return float(np.quantile(ring_m[:, 2], 0.02))
 
 
-def standing_off(cloud: Cloud, origin_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return which points (N,) lie outside the body about the vertical through its middle (3,), as a handle's do, and how much
-    each faces away from that (N,): the cosine.
+def standing_off(cloud: Cloud, origin_m: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return which points (N,) lie outside the body about the vertical through its middle (3,), as a handle's do; how much each
+    faces away from that (N,), the cosine; and how wide the body is at the height of each (N,), its radius in metres.
     """
     radial = (cloud.points_m - origin_m)[:, :2]
     radius_m = np.linalg.norm(radial, axis=1)
     outward = np.einsum("nc,nc->n", radial, cloud.normals[:, :2]) / np.maximum(radius_m, 1e-9)
     body_m = _body_radius(cloud.points_m[:, 2], radius_m, outward > 0.5)
-    return radius_m > (1.0 + GAP) * body_m, outward
+    return radius_m > (1.0 + GAP) * body_m, outward, body_m
 
 
 def _body_radius(height_m: np.ndarray, radius_m: np.ndarray, outside: np.ndarray) -> np.ndarray:

@@ -53,8 +53,11 @@ class Warp:
 
     @cached_property
     def is_known(self) -> np.ndarray:
-        """Which of the target's points (M,) the source can have, too: all but what is `foreign` to it."""
-        return ~foreign(self.target, self.target_frame, self.source)
+        """Which of the target's points (M,) the source can have, too: all but what is `foreign` to it.
+
+        By the clouds alone: the target's frame is that of what was left when it was fitted.
+        """
+        return ~foreign(self.target, self.source)
 
     @cached_property
     def ring(self) -> Ring | None:
