@@ -46,7 +46,8 @@ def rim_and_opening(
         hidden = is_divided or (len(clear) == 0 and _is_wide(pool[:, :, first], i, j))
         from_m = _reach(pool[:, :, first], axes, centre, cell) if hidden else 0.0
         rim = _rim_about(surface, centre, start, top_m, from_m, name)
-        if not is_divided and _share_outside(pool[:, :, first], axes, rim, cell) > _MOST_OUTSIDE:
+        outside = _share_outside(pool[:, :, first], axes, rim, cell)
+        if not is_divided and _MOST_OUTSIDE < outside < 1 - _MOST_OUTSIDE:  # all of it: about a spoon
             is_divided, turns = True, 3
         centre = _middle(pool[:, :, first], axes) if is_divided else rim[:, :2].mean(axis=0)
     return rim, rim.mean(axis=0)
