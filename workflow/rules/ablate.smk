@@ -132,6 +132,10 @@ use rule parametrise as ablate_parametrise with:
         "logs/ablate/{variant}/parametrise_{object}.log",
     benchmark:
         "benchmarks/ablate/{variant}/parametrise_{object}.tsv"
+    params:
+        source=SOURCE,
+        options=rules.parametrise.params.options,
+        code=rules.parametrise.params.code,
 
 
 use rule simulate_pouring as ablate_pouring with:

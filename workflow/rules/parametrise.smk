@@ -18,10 +18,11 @@ rule parametrise:
         "benchmarks/parametrise/{source}/{object}.tsv"
     threads: 1
     params:
+        source="{source}",
         options=options("parametrise", "hull_points"),
         code=code("pipeline.parametrise"),
     shell:
-        "python -m pipeline.parametrise --object {wildcards.object} --source {wildcards.source}"
+        "python -m pipeline.parametrise --object {wildcards.object} --source {params.source}"
         " --point-mapping {input.point:q} --label-mapping {input.label:q}"
         " --parameters {output.parameters:q} --tilt-references {output.tilt_references:q} {params.options} > {log:q} 2>&1"
 
@@ -41,6 +42,7 @@ use rule parametrise as parametrise_by with:
     benchmark:
         "benchmarks/parametrise/{source}/by/{method}_k{k}/{object}.tsv"
     params:
+        source="{source}",
         # Rigidly warped, a mug leaves a wide bowl without a rim: the comparison says so.
         options=options("parametrise", "hull_points") + " --allow-missing",
         code=code("pipeline.parametrise"),
