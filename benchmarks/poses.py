@@ -170,7 +170,7 @@ def main() -> None:
             (f"one of 12 views {1e3 * off_m:g} mm along the table", scenes.one_moved(twelve, off_m))
             for off_m in ASTRAY_M
         ]
-        sys.stdout.write("| poses off, an axis | as given | refined |\n|---|---|---|\n")
+        sys.stdout.write("| poses off (at random: an axis) | as given | refined |\n|---|---|---|\n")
         for said, case in cases:
             sys.stdout.write(f"| {said} | {as_given(case, 'mug')} | {refined(case, 'mug')} |\n")
             sys.stdout.flush()

@@ -44,7 +44,8 @@ def project(tmp_path):
     write_table(processed / "parametrise/mug/parameters.parquet", pd.DataFrame([row]), "parameters")
     models = [fitted("mug", "label_mapping", draw)[0] for draw in range(2)]
     write_models(processed / "classify/pouring/models.json", models)
-    write_json(processed / "fuse/mug/fusion.json", {"layout": "7-scenes", "n_views": 36, "watertight": True})
+    fusion = {"layout": "7-scenes", "n_views": 36, "watertight": True, "complaints": ["the rim was not seen"]}
+    write_json(processed / "fuse/mug/fusion.json", fusion)
     return tmp_path
 
 
@@ -109,6 +110,7 @@ def test_show_gives_what_there_is(project, capsys):
     said = capsys.readouterr().out
     assert "capacity" in said
     assert "parts       not made yet" in said
+    assert "told        the rim was not seen" in said
 
 
 @pytest.fixture

@@ -35,11 +35,13 @@ def taken_before_it_overflows(
 TOO_LITTLE = pytest.mark.xfail(reason="the lattice of the top layer takes some of what falls in")
 
 
-# Not so the bowl: where its vertices are a nanometre elsewhere, as with other roundings, three of four miss it at some free room,
-# by 6 at most. A layer has 113 particles, the cylinder's 43, and all seeds begin from the same few states. The next test is of
-# the bowl, too.
+# Where the bowl's vertices are a nanometre elsewhere, as with other roundings, three of four miss it at some free room, by 6 at
+# most: a layer has 113 particles, the cylinder's 43. The next test holds for the bowl, too.
+BY_CHANCE = pytest.mark.xfail(reason="all seeds begin from the same few states at the brim")
+
+
 @pytest.mark.parametrize("room", ROOMS)
-@pytest.mark.parametrize("name", ["cylinder", "thin", "cone"])
+@pytest.mark.parametrize("name", ["cylinder", "thin", "cone", pytest.param("bowl", marks=BY_CHANCE)])
 def test_filled_gently_it_overflows_when_its_free_room_is_taken(
     request: pytest.FixtureRequest, name: str, room: int
 ) -> None:
