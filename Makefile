@@ -2,7 +2,8 @@
 #
 #   make reports/roc.pdf   the figure, from whatever is in data/raw (CORES=8 make … for more than two cores)
 #   make all               everything that the workflow makes
-#   make test              lint, then every test
+#   make test              lint, then every test but the long ones: a quarter of an hour
+#   make test-all          lint, then every test, as CI does
 #   make docs              the documentation site, build/docs/index.html
 #   make setup             .venv alone
 #   make track             record in MLflow the calls that it lacks
@@ -19,8 +20,9 @@ PYTHONS := python3.11 python3.12 python3
 TYPED := src
 # Tests run as the workflow's jobs do, one thread each: two processes with two threads each wait for each other most of the time.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
+TESTS = $(ONE_THREAD) $(BIN)/python -m pytest -n $(CORES) --dist loadscope
 
-.PHONY: all test lint docs setup format track mlflow-server FORCE
+.PHONY: all test test-all lint docs setup format track mlflow-server FORCE
 .DELETE_ON_ERROR:
 
 all: $(STAMP)
@@ -30,7 +32,10 @@ reports/%: $(STAMP) FORCE
 	$(BIN)/snakemake -c$(CORES) $@
 
 test: lint
-	$(ONE_THREAD) $(BIN)/python -m pytest -n $(CORES) --dist loadscope
+	$(TESTS) -m "not long"
+
+test-all: lint
+	$(TESTS)
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

@@ -5,9 +5,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 
 
+@pytest.mark.long
 def test_the_benchmark_of_the_liquid_runs_and_its_pour_is_true():
     options = ["--json", "--rounds", "1", "--seconds", "0.1", "--most-particles", "155"]
     run = subprocess.run(

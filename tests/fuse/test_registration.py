@@ -82,6 +82,7 @@ def shifts_m(scan, truth: np.ndarray) -> np.ndarray:
     return np.linalg.norm(found[:, :2, 3] - np.median(found[:, :2, 3], axis=0), axis=1)
 
 
+@pytest.mark.long
 def test_paint_tells_the_turns_of_a_round_cup(tmp_path):
     truth = record(tmp_path, "small_cup", colour=paint)
     scan = located(tmp_path)

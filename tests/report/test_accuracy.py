@@ -46,6 +46,7 @@ def test_balanced_accuracy_is_the_mean_over_targets_of_the_mean_over_rim_and_han
     assert over_targets == pytest.approx((0.8125 + 0.875) / 2)
 
 
+@pytest.mark.long
 def test_fused_surfaces_are_near_the_true_ones_on_both_sides_of_the_wall(metrics):
     for name in NAMES:
         assert metrics[f"fuse.{name}.inner_error_mm_mean"] < 0.6, name
@@ -56,6 +57,7 @@ def test_fused_surfaces_are_near_the_true_ones_on_both_sides_of_the_wall(metrics
     assert metrics["fuse.capacity.relative_error_max"] < 0.02
 
 
+@pytest.mark.long
 def test_the_cavity_is_seen_and_its_normals_are_true(metrics):
     assert metrics["fuse.cavity_seen_share_min"] > 0.98
     assert metrics["fuse.seen_normals_within_10_deg_share"] > 0.95
@@ -63,6 +65,7 @@ def test_the_cavity_is_seen_and_its_normals_are_true(metrics):
     assert metrics["fuse.normals_flipped_share_max"] < 0.001
 
 
+@pytest.mark.long
 def test_labels_find_the_parts_that_the_baseline_misses(metrics):
     """The baseline calls every point container and nothing else."""
     assert metrics["label.balanced_accuracy"] >= 0.85
@@ -74,6 +77,7 @@ def test_labels_find_the_parts_that_the_baseline_misses(metrics):
         assert metrics[f"warp.label_mapping.{part}.baseline_iou"] == 0.0, part
 
 
+@pytest.mark.long
 def test_no_wall_is_crossed_and_no_point_left_alone(metrics):
     for mapping in ("label_mapping", "point_mapping"):
         assert metrics[f"warp.{mapping}.wall_side_flips"] == 0.0, mapping
@@ -89,6 +93,7 @@ BARS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("bar", BARS)
 def test_parameters_are_near_the_true_ones(metrics, bar):
     assert metrics[f"parametrise.label_mapping.{bar}"] <= BARS[bar]

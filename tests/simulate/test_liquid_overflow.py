@@ -8,6 +8,8 @@ from pipeline.simulate import liquid, rest
 from pipeline.simulate.liquid import Vessel
 from pipeline.simulate.particles import particles
 
+pytestmark = pytest.mark.long
+
 VESSELS = ("cylinder", "thin", "cone", "bowl")
 ROOMS = (6, 10, 15, 20)
 SEEDS = range(1, 25)

@@ -91,6 +91,7 @@ def test_a_shared_settled_state_gives_the_labels_that_one_of_its_own_gives(
         assert abs(a - b) <= max(3, 0.04 * n)
 
 
+@pytest.mark.long
 def test_single_precision_gives_the_labels_that_double_gives(
     cylinder: Vessel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -110,6 +111,7 @@ def test_single_precision_gives_the_labels_that_double_gives(
     assert [left > 0 for left in double] == [left > 0 for left in single]
 
 
+@pytest.mark.long
 def test_ending_the_pressure_iterations_early_gives_the_labels_that_all_of_them_give(
     cylinder: Vessel, tmp_path: Path
 ) -> None:

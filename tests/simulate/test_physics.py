@@ -62,6 +62,7 @@ def test_rest_spill_and_overflow_are_near_hydrostatics(cylinder: Vessel):
     assert uncalibrated["x"] == LOWERED
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["cylinder", "cone"])
 def test_pouring_begins_where_hydrostatics_says_and_nearer_at_half_the_spacing(request, name):
     """Within 3° or one spacing held back at the lip at 10 mm, within half of that at 5 mm; the threshold is 1 ml at both."""
@@ -105,6 +106,7 @@ def measured(tmp_path_factory) -> pd.DataFrame:
     return rows
 
 
+@pytest.mark.long
 def test_a_trial_that_runs_again_as_it_was_has_its_label(measured):
     again = measured[measured.check == "converge_pouring"].set_index("x")
     assert len(again) == 4
@@ -115,6 +117,7 @@ def test_a_trial_that_runs_again_as_it_was_has_its_label(measured):
         assert (measured.check == f"repeat_{experiment}").sum() == 4
 
 
+@pytest.mark.long
 def test_an_object_is_measured_at_three_spacings_and_at_all_tilts(measured):
     capacity = measured[measured.check == "capacity"]
     assert capacity.spacing_m.round(4).tolist() == [0.0196, 0.014, 0.0098]
@@ -138,6 +141,7 @@ def test_volumes_and_thresholds_stay_when_the_spacing_is_halved(cylinder: Vessel
     assert [row["measured"] for row in convergence.pouring("cylinder", pair, trial, 51)] == [0.0, 0.0]
 
 
+@pytest.mark.long
 def test_even_the_coarsest_particles_fill_an_object_to_two_of_them(measured):
     coarsest = measured[measured.check == "capacity"].iloc[0]
     assert abs(coarsest.measured - coarsest.expected) < 2 * coarsest.spacing_m**3

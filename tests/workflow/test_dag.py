@@ -74,6 +74,7 @@ def test_a_second_call_does_nothing_and_records_nothing(project):
     assert (project.contents(), len(_runs(project))) == before
 
 
+@pytest.mark.long
 def test_one_core_gives_the_same_bytes_as_two(finished, unfinished):
     told = unfinished.call("--config", "track={enabled: false}", cores=1)
     assert told.returncode == 0, told.stdout
@@ -173,6 +174,7 @@ def test_a_changed_annotation_reruns_the_labels(project):
     assert project.planned() == LABELLED | WARPED
 
 
+@pytest.mark.long
 def test_an_object_is_dropped_and_taken_away_again(project):
     before = project.contents()
     mesh = trimesh.load_mesh(project / "data/processed/scan/short_cup/truth.ply")

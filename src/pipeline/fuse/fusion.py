@@ -72,14 +72,13 @@ def fused(
         "wall_thickened_share": surface.thickened_share,
         "open_below_m": surface.open_below_m,
     }
-    lowest_m = float(surface.vertices_m[:, 2].min())
     told = recorded.complaints(facts) + coverage.complaints(
         shares,
-        surface.thickened_share,
-        lowest_m,
-        coverage.step_m(surface),
-        surface.table_closed_m2,
-        surface.open_below_m,
+        thickened_share=surface.thickened_share,
+        lowest_m=float(surface.vertices_m[:, 2].min()),
+        stepped_m=coverage.step_m(surface),
+        table_closed_m2=surface.table_closed_m2,
+        open_below_m=surface.open_below_m,
     )
     return _result(surface, n_points, True, rng, facts | {"complaints": told})
 
