@@ -202,6 +202,23 @@ def test_a_unit_of_depth_that_is_a_little_off_is_named(recorded, tmp_path, facto
     assert float(message.split("depth_scale: ")[1].split("`")[0]) == pytest.approx(1000 * factor, rel=0.005)
 
 
+def test_a_unit_of_depth_that_is_a_little_off_is_named_though_neighbours_in_a_sequence_agree(
+    recorded, tmp_path
+):
+    views = read(tmp_path, recorded, "open3d")
+    slow = np.repeat(np.arange(len(recorded)), 8)
+    views = replace(
+        views,
+        depths_m=[views.depths_m[i] * np.float32(0.97) for i in slow],
+        T_world_cameras=[views.T_world_cameras[i] for i in slow],
+        intrinsics=views.intrinsics[slow],
+        names=[f"{number:06d}" for number in range(len(slow))],
+    )
+    with pytest.raises(PipelineError) as caught:
+        agreement.checked(views, "cup", np.random.default_rng(1))
+    assert float(str(caught.value).split("depth_scale: ")[1].split("`")[0]) == pytest.approx(970, rel=0.005)
+
+
 @pytest.mark.parametrize("factor", [0.9, 1.05])
 def test_another_focal_length_is_named(recorded, tmp_path, factor):
     views = read(tmp_path, recorded, "open3d")

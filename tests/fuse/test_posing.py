@@ -129,4 +129,5 @@ def test_poses_that_could_not_be_refined_are_named_and_not_taken_for_noise():
     found = recorded.complaints({"poses": "given", "poses_off_m": 0.0031, "table_spread_m": 0.0027})
     assert len(found) == 1
     assert "off by 3.1 mm" in found[0]
+    assert "too far off, or too little is seen" in found[0]
     assert "fused as given" in found[0]

@@ -92,7 +92,8 @@ def _check_range(views: Views, name: str) -> None:
 
 @dataclass(frozen=True)
 class Sample:
-    """Points (M, 3) of each view in its camera's frame, and the pairs (P, 2) of views that are compared."""
+    """Points (M, 3) of each view in its camera's frame, and the pairs (P, 2) of views that are compared: all of them, or
+    neighbours and after them `PAIRS` by chance."""
 
     points_m: list[np.ndarray]
     pairs: np.ndarray
@@ -207,12 +208,16 @@ def _sentence(mistake: Mistake, name: str) -> str:
 
 def _of_scale(views: Views, sample: Sample, poses: np.ndarray, name: str) -> Mistake | None:
     """Return what explains how far views are apart whose poses are about right: focal length or unit of depth some percent off."""
-    thinned = replace(sample, points_m=[points[::EVERY] for points in sample.points_m])
+    # Neighbours in a hand-held sequence stand so near to each other that they agree with any scale.
+    far = sample.pairs[-PAIRS:]
+    thinned = Sample([points[::EVERY] for points in sample.points_m], far)
 
     def apart_m(focal: float = 1.0, depth: float = 1.0) -> float:
         return _apart_m(views, thinned, poses, focal, depth)
 
     given_m = apart_m()
+    if np.isnan(given_m):  # none that are apart show the same
+        return None
     slight = (1 / SLIGHT, SLIGHT)
     if min(*map(apart_m, slight), *(apart_m(depth=factor) for factor in slight)) > NEARER * given_m:
         return None
@@ -246,10 +251,13 @@ def _apart_m(views: Views, sample: Sample, poses: np.ndarray, focal: float, dept
     apart = []
     for j, T in enumerate(poses):
         others = sample.pairs[sample.pairs[:, 1] == j, 0]
+        if len(others) == 0:
+            continue
         points = frames.apply(frames.inverse(T), np.concatenate([places[i] for i in others]))
         measured, expected = projected(points, K[j], views.depths_m[j])
         apart.append(np.abs(measured * depth - expected)[measured > 0])
-    return float(np.median(np.concatenate(apart)))
+    together = np.concatenate(apart)
+    return float(np.median(together)) if len(together) else np.nan
 
 
 def _of_depth(scale: float, name: str) -> Mistake:

@@ -72,7 +72,7 @@ def complaints(facts: dict[str, Any]) -> list[str]:
     """Return a sentence each: views that do not fit, colours that were not used, poses that are off, depth too noisy for walls."""
     told = []
     off_m, as_given = facts["poses_off_m"] or 0.0, facts["poses"] == "given"
-    refused = "fused as given, as too little is seen to refine them"
+    refused = "fused as given, as they are too far off, or too little is seen, to refine them"
     done = refused if as_given else "refined on table and object"
     if off_m > posing.OFF_M:
         told.append(
