@@ -7,7 +7,7 @@ import pytest
 from fuse import scenes
 from scipy.spatial.transform import Rotation
 
-from pipeline.fuse import layouts, posing, recorded, tsdf
+from pipeline.fuse import layouts, placement, posing, recorded, tsdf
 from pipeline.geometry import frames
 from pipeline.geometry.cavity import cavity
 from pipeline.scan.shapes import shape
@@ -52,6 +52,20 @@ def test_views_of_a_round_object_by_a_camera_that_is_askew_are_refined_and_keep_
     surface = tsdf.fuse(found.views, found.placement, 0.00125, 0.0025, "cup")
     room = cavity(surface.vertices_m, surface.triangles, name="cup")
     assert room.capacity_m3 == pytest.approx(shape("small_cup").capacity_m3, rel=0.03)
+
+
+def test_a_table_that_poses_split_in_two_is_no_board_once_they_are_refined():
+    """As where a hand-held camera's track jumps: of half of the views the table is 7 mm higher."""
+    given, _ = scenes.views(shape("mug"), 12)
+    raised = frames.transform(np.eye(3), np.array([0.0, 0.0, 0.007]))
+    poses = [raised @ T if i < 6 else T for i, T in enumerate(given.T_world_cameras)]
+    jumped = replace(given, T_world_cameras=poses)
+    assert placement.find(jumped, "scan", np.random.default_rng(2))[1].raised_m > placement.LEAST_BOARD_M
+    found = located(jumped)
+    assert found.facts()["poses"] == "refined"
+    assert found.placement.raised_m == 0.0
+    surface = tsdf.fuse(found.views, found.placement, 0.00125, 0.0025, "mug")
+    assert surface.vertices_m[:, 2].max() == pytest.approx(shape("mug").height_m, abs=0.0015)
 
 
 def test_depths_that_are_too_long_are_told_beside_poses_that_were_refined():
@@ -106,9 +120,15 @@ def test_what_a_view_shows_of_the_table_stands_it_upright():
 def test_views_that_do_not_fit_and_colours_that_do_not_lie_over_depth_are_told():
     facts = {"poses": "registered", "poses_off_m": None, "table_spread_m": 0.001}
     assert recorded.complaints(facts | {"views_left_out": [], "colours_differ": False}) == []
-    left_out, colours = recorded.complaints(facts | {"views_left_out": list("abcde"), "colours_differ": True})
-    assert left_out.startswith("a, b, c and 2 more: left out")
+    different = {
+        "views_left_out": list("abcde"),
+        "views_without_object": list("fg"),
+        "colours_differ": True,
+    }
+    left_out, without, colours = recorded.complaints(facts | different)
+    assert left_out.startswith("a, b, c and 2 more: left out, as they do not fit")
     assert left_out.endswith("; remove them")
+    assert without.startswith("f, g: left out, as they show no object")
     assert "another size than depth" in colours
 
 

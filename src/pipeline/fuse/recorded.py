@@ -22,7 +22,7 @@ LEAST_SEEN, LOW_SHARE = 0.85, 0.1  # of the surface higher than this share of th
 @dataclass(frozen=True)
 class Located:
     """Views that fit together and their planes, the table and the object on it; left_out: names of the views that do not fit;
-    registration: how poses were found, empty where they were given; poses_off_m: by how much they were off as given, all but
+    without_object: of those that were left out when poses were refined, as they show no object there; registration: how poses were found, empty where they were given; poses_off_m: by how much they were off as given, all but
     those of the views astray, and whether they were refined; depths_too_long: by which share depths are, if that is why they were
     off along the cameras' axes."""
 
@@ -36,6 +36,7 @@ class Located:
     astray: tuple[str, ...] = ()
     is_refined: bool = False
     depths_too_long: float | None = None
+    without_object: tuple[str, ...] = ()
 
     @cached_property
     def spread_m(self) -> float:
@@ -51,6 +52,7 @@ class Located:
             "n_views": len(views.depths_m),
             "n_views_found": views.n_found,
             "views_left_out": self.left_out,
+            "views_without_object": list(self.without_object),
             "unit_m": 1.0,
             "T_object_world": self.placement.T_object_world.tolist(),
             "table_plane_world": [*self.plane.normal.tolist(), self.plane.offset_m],
@@ -97,11 +99,13 @@ def complaints(facts: dict[str, Any]) -> list[str]:
             f"it stands on a board, {1e3 * raised_m:.0f} mm above the table around, whose top counts as the table; if that is a "
             "foot of its own, a scan cannot tell: drop a mesh of it"
         )
-    if left_out := [*facts.get("views_left_out", []), *facts.get("views_without_object", [])]:
-        cure = "remove them" if facts["poses"] == "registered" else "correct their poses or remove them"
-        told.append(
-            f"{_named(left_out)}: left out, as they do not fit the other views or show no object; {cure}"
-        )
+    is_registered = facts["poses"] == "registered"
+    if left_out := facts.get("views_left_out"):
+        cure = "remove them" if is_registered else "correct their poses or remove them"
+        told.append(f"{_named(left_out)}: left out, as they do not fit the other views; {cure}")
+    if without := facts.get("views_without_object"):
+        cure = "remove them" if is_registered else "if they look elsewhere all is well, if not, correct their poses"
+        told.append(f"{_named(without)}: left out, as they show no object where the others do; {cure}")
     if facts.get("colours_differ"):
         told.append(
             "colours were not used to find poses, as their images are of another size than depth; align colour to depth"
@@ -148,7 +152,10 @@ def located(views: Views, name: str, rng: np.random.Generator) -> Located:
         if refined is not None:
             posed, unseen = refined
             told |= {"is_refined": True, "depths_too_long": posing.too_long(views, posed)}
-            views, place, left_out = posed, posing.shown_again(posed, place), left_out + unseen
+            if place.raised_m > 0:  # a table that poses split in two looks like a board
+                plane, place = placement.find(posed, name, aside)
+            views, place = posed, posing.shown_again(posed, place)
+            told["without_object"] = tuple(unseen)
         seen_by = planes(views, place)
     return Located(views, plane, place, seen_by, left_out, found, **told)
 

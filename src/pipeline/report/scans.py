@@ -94,8 +94,8 @@ def summary(seen: "np.ndarray", facts: dict[str, Any]) -> str:
         said.append("turns of the table as given")
     elif facts.get("roll_observable") is False:
         said.append("turn about the vertical not observable: round")
-    if facts.get("views_left_out"):
-        said.append(f"{len(facts['views_left_out'])} views left out")
+    if left_out := [*facts.get("views_left_out", []), *facts.get("views_without_object", [])]:
+        said.append(f"{len(left_out)} views left out")
     said.append("closed" if facts["watertight"] else "NOT closed")
     return "; ".join(said)
 
