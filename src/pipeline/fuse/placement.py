@@ -39,7 +39,8 @@ AROUND_M = 0.15  # the table is fitted again this far around the object: depth c
 BESIDE_M, LEAST_BOARD_M, MOST_BOARD_M, BOARD_SHARE, MOST_OPEN_RAD = 0.03, 0.002, 0.012, 0.1, 0.75 * np.pi
 _ASKED = 300_000  # points at most tell heights, noise, and what is below the table: every so many
 _COMPARED = 5_000  # points of each of two objects
-_HITS_OF_NOISE = 3  # stray pixels hit a cell once or twice; a cell of the object is hit by many views
+# Stray pixels hit a cell once or twice; a cell of the object is hit by many views, so many times as often if it faces them.
+_HITS_OF_NOISE, _CLEARLY = 3, 3.0
 
 
 class NoObject(PipelineError):
@@ -78,7 +79,8 @@ def find(
     The table is the plane of most points on which something stands; raised_m: how much higher the object stands, where that is
     known. A `PipelineError` says what is missing, or shows both objects when there are two.
     """
-    points, middle = table.world_points(views), table.focus(views)
+    middle = table.focus(views)
+    points = table.world_points(views, _stride(views, middle))
     x, y, z = (points.places_m - middle).T
     near = points.only(x * x + y * y + z * z < table.NEAR_M**2)
     some = table.thinned(near.places_m, _ASKED)
@@ -97,6 +99,19 @@ def find(
         except NoObject as failure:
             failures.append(failure)
     raise failures[0]
+
+
+def _stride(views: Views, focus: np.ndarray) -> int:
+    """Return every how many pixels are enough to tell an object at the focus (3,) from noise: fewer where it is far away."""
+    reach_m = np.median([np.linalg.norm(focus - T[:3, 3]) for T in views.T_world_cameras])
+    across = CELL_M * float(np.median(views.intrinsics[:, 0, 0])) / reach_m  # pixels of a cell
+    needed = _CLEARLY * _hits_of_noise(len(views.names))
+    return next((s for s in range(table.STRIDE, 1, -1) if len(views.names) * (across / s) ** 2 >= needed), 1)
+
+
+def _hits_of_noise(n_views: int) -> int:
+    """Return how often stray pixels of so many views hit a cell at most."""
+    return min(_HITS_OF_NOISE, n_views // 3)
 
 
 def on_a_plane(points_m: np.ndarray, name: str, rng: np.random.Generator) -> tuple[Plane, Placement]:
@@ -254,7 +269,7 @@ def _clusters(points: Points, middle: np.ndarray, gap_m: float) -> list[Cluster]
     cells = np.floor((places[:, :2] - origin) / CELL_M).astype(int)
     counts = np.zeros(cells.max(axis=0) + 1, int)
     np.add.at(counts, tuple(cells.T), 1)
-    hit = counts > min(_HITS_OF_NOISE, n_views // 3)
+    hit = counts > _hits_of_noise(n_views)
     bridged = max(1, round(gap_m / CELL_M / 2))
     held = np.pad(hit, bridged + 1)
     labels, n = ndimage.label(ndimage.binary_closing(held, iterations=bridged), np.ones((3, 3)))

@@ -15,6 +15,9 @@ from pipeline.geometry import frames
 
 # Right poses are off by 0.05 to 0.15 mm, by 0.3 in images of 512 pixels across 90°; by 0.9 mm the inside of a mug is lost.
 OFF_M = 0.00035
+# Right poses of cameras a metre away are off by 0.55 mm, and by as much once they are refined: it is depth's noise. Of poses that
+# were wrong a seventh is left at most.
+MOST_NOISE_M, NO_NEARER = 0.0008, 0.85
 MEDIUM, FINE = 6, 3  # pixels
 AROUND_M, NEAR_M = 0.06, 0.015  # the object, and the plane: what counts as the table there
 ALIKE_M = 0.003  # around the median height in a view; beyond it is a board's edge or clutter

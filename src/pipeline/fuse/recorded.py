@@ -1,6 +1,6 @@
 """Depth images on their way to fusion: poses checked, or found where there are none; table and object found."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -21,15 +21,18 @@ LEAST_SEEN, LOW_SHARE = 0.85, 0.1  # of the surface higher than this share of th
 
 @dataclass(frozen=True)
 class Located:
-    """Views that fit together and their planes, the table and the object on it; left_out: names of the views that do not fit;
-    without_object: of those that were left out when poses were refined, as they show no object there; registration: how poses were found, empty where they were given; poses_off_m: by how much they were off as given, all but
-    those of the views astray, and whether they were refined; depths_too_long: by which share depths are, if that is why they were
-    off along the cameras' axes."""
+    """Views that fit together and, where they are at hand, their planes; the table and the object on it.
+
+    left_out: names of the views that do not fit; without_object: of those that show none where poses were refined; registration:
+    how poses were found, empty where they were given; poses_off_m: by how much they were off as given, all but those of the views
+    astray, and whether they were refined; depths_too_long: by which share depths are, if that is why they were off along the
+    cameras' axes.
+    """
 
     views: Views
     plane: Plane
     placement: Placement
-    seen_by: Planes
+    seen_by: Planes | None
     left_out: list[str]
     registration: dict[str, Any]
     poses_off_m: float | None = None
@@ -104,7 +107,11 @@ def complaints(facts: dict[str, Any]) -> list[str]:
         cure = "remove them" if is_registered else "correct their poses or remove them"
         told.append(f"{_named(left_out)}: left out, as they do not fit the other views; {cure}")
     if without := facts.get("views_without_object"):
-        cure = "remove them" if is_registered else "if they look elsewhere all is well, if not, correct their poses"
+        cure = (
+            "remove them"
+            if is_registered
+            else "if they look elsewhere all is well, if not, correct their poses"
+        )
         told.append(f"{_named(without)}: left out, as they show no object where the others do; {cure}")
     if facts.get("colours_differ"):
         told.append(
@@ -142,22 +149,41 @@ def located(views: Views, name: str, rng: np.random.Generator) -> Located:
     if found:
         return Located(views, plane, place, seen_by, left_out, found)
     aside = rng.spawn(1)[0]  # what is drawn later stays as it is
-    off_m, is_astray = sliding.off(seen_by, place, aside)
-    off_m = max(posing.off_m(views, place), off_m)
+    off_m, astray = _off(views, place, seen_by, aside)
+    given = Located(views, plane, place, None, left_out, found, off_m, astray)
+    if off_m <= posing.OFF_M and not astray:
+        return replace(given, seen_by=seen_by)
+    del seen_by  # much, of many views
+    refined = posing.refined(views, place, name, rng)
+    return given if refined is None else _refined(given, *refined, name, aside)
+
+
+def _off(
+    views: Views, place: Placement, seen_by: Planes, rng: np.random.Generator
+) -> tuple[float, tuple[str, ...]]:
+    """Return how far poses are off, by the table and along it, and the names of the views that are astray."""
+    along_m, is_astray = sliding.off(seen_by, place, rng)
     astray = tuple(view for view, is_off in zip(views.names, is_astray, strict=True) if is_off)
-    told: dict[str, Any] = {"poses_off_m": off_m, "astray": astray}
-    if off_m > posing.OFF_M or astray:
-        del seen_by  # much, of many views
-        refined = posing.refined(views, place, name, rng)
-        if refined is not None:
-            posed, unseen = refined
-            told |= {"is_refined": True, "depths_too_long": posing.too_long(views, posed)}
-            if place.raised_m > 0:  # a table that poses split in two looks like a board
-                plane, place = placement.find(posed, name, aside)
-            views, place = posed, posing.shown_again(posed, place)
-            told["without_object"] = tuple(unseen)
-        seen_by = planes(views, place)
-    return Located(views, plane, place, seen_by, left_out, found, **told)
+    return max(posing.off_m(views, place), along_m), astray
+
+
+def _refined(given: Located, views: Views, unseen: list[str], name: str, rng: np.random.Generator) -> Located:
+    """Return the views with refined poses, of which some do not show the object; or as given where what was off is noise."""
+    plane, place = given.plane, given.placement
+    if place.raised_m > 0:  # a table that poses split in two looks like a board
+        plane, place = placement.find(views, name, rng)
+    place = posing.shown_again(views, place)
+    seen_by, off_m = planes(views, place), given.poses_off_m or 0.0
+    if not given.astray and off_m < posing.MOST_NOISE_M:
+        left_m, _ = _off(views, place, seen_by, rng)
+        if left_m > posing.NO_NEARER * off_m:
+            return replace(given, poses_off_m=float(np.sqrt(max(off_m**2 - left_m**2, 0.0))))
+    return Located(
+        *(views, plane, place, seen_by, given.left_out, {}, given.poses_off_m, given.astray),
+        is_refined=True,
+        depths_too_long=posing.too_long(given.views, views),
+        without_object=tuple(unseen),
+    )
 
 
 def check_registered(scan: Located, vertices_m: np.ndarray, seen: np.ndarray, name: str) -> None:

@@ -19,7 +19,7 @@ NEAR_M = 0.6  # around what the cameras look at; the rest is background
 LEAST_ABOVE = 0.9  # of the cameras are above a table
 CURE = "check that poses are camera→world in metres and the depth's scale (scan.yaml: depth_scale)"
 _TRIALS, _COUNTED, _REFINED = 2000, 4000, 100_000
-_STRIDE = 3
+STRIDE = 3  # pixels
 
 
 @dataclass(frozen=True)
@@ -93,8 +93,8 @@ def local_heights(x_m: np.ndarray, y_m: np.ndarray, z_m: np.ndarray) -> np.ndarr
     return np.asarray(ndimage.median(z_m, cell, np.arange(cell.max() + 1)))[cell]
 
 
-def world_points(views: Views, stride: int = _STRIDE) -> Points:
-    """Return every third pixel of every third row of every view."""
+def world_points(views: Views, stride: int = STRIDE) -> Points:
+    """Return every so many pixels of every so many rows of every view."""
     clouds = []
     for depth, K, T_world_camera in zip(views.depths_m, views.intrinsics, views.T_world_cameras, strict=True):
         v, u = np.nonzero(depth[::stride, ::stride] > 0)

@@ -118,7 +118,8 @@ def _read(folder: Path, source: Path) -> dict:
             if not found.T_world_cameras:
                 return {**read, "views_left_out": [], "complaints": []}
             scan = recorded.located(found, str(folder), np.random.default_rng(0))
-            return {**read, "views_left_out": [*scan.left_out, *scan.without_object], "complaints": recorded.complaints(scan.facts())}
+            left_out = [*scan.left_out, *scan.without_object]
+            return {**read, "views_left_out": left_out, "complaints": recorded.complaints(scan.facts())}
         vertices_m, triangles, _, facts = dropped.read(found, np.random.default_rng(0))
         capacity_m3 = cavity(vertices_m, triangles, name=str(folder)).capacity_m3
     except PipelineError as error:
