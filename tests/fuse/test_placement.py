@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-from fuse import writers
+from fuse import scenes, writers
 from fuse.conftest import OPTIONS
 
 from pipeline.errors import PipelineError
-from pipeline.fuse import layouts, levelled, placement, posing, recorded, registration
+from pipeline.fuse import layouts, levelled, placement, posing, recorded, registration, table
 from pipeline.fuse.fusion import fused
 from pipeline.fuse.planes import planes
 from pipeline.geometry import frames
@@ -257,3 +257,13 @@ def test_a_lid_is_no_turntable(tmp_path):
     lidded = body.vertices + [0.03, -0.02, recording.TABLE_HEIGHT_M], body.faces
     _, place = found(tmp_path, lidded)
     assert place.bounds_m[1, 2] == pytest.approx(0.115 + placement.MARGIN_M, abs=0.003)
+
+
+def test_points_near_a_place_are_those_of_all_that_are_near_to_it():
+    views, _ = scenes.views(shape("mug"), 10)
+    everything, middle = table.world_points(views), table.focus(views)
+    near = table.world_points(views, around=middle, within_m=0.1)
+    is_near = np.sum((everything.places_m - middle) ** 2, axis=1) < 0.1**2
+    assert 0 < is_near.sum() < len(is_near) / 2
+    np.testing.assert_array_equal(near.places_m, everything.places_m[is_near])
+    np.testing.assert_array_equal(near.view, everything.view[is_near])

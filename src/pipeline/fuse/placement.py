@@ -80,9 +80,7 @@ def find(
     known. A `PipelineError` says what is missing, or shows both objects when there are two.
     """
     middle = table.focus(views)
-    points = table.world_points(views, _stride(views, middle))
-    x, y, z = (points.places_m - middle).T
-    near = points.only(x * x + y * y + z * z < table.NEAR_M**2)
+    near = table.world_points(views, _stride(views, middle), middle, table.NEAR_M)
     some = table.thinned(near.places_m, _ASKED)
     eyes = np.array([T[:3, 3] for T in views.T_world_cameras])
     failures: list[NoObject] = []

@@ -101,20 +101,27 @@ def too_long(given: Views, posed: Views) -> float:
 
 def shown_again(views: Views, place: Placement) -> Placement:
     """Return where the object stands, as before, with the points that the refined views show there."""
-    x, y, z = places = frames.apply(place.T_object_world, table.world_points(views).places_m).T
+    x, y, z = places = _about(views, place, table.STRIDE)[0].T
     own = (z > placement.ABOVE_M) & (z < place.bounds_m[1, 2]) & place.covers(x, y)
     return replace(place, points_m=places.T[own])
 
 
 def ground(views: Views, place: Placement, stride: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the points (N, 3) of what the object stands on, around it, its frame, and the view (N,) that each is from."""
-    points = table.world_points(views, stride)
-    places = frames.apply(place.T_object_world, points.places_m)
+    places, own = _about(views, place, stride)
     x, y, z = places.T
     near = np.flatnonzero(place.beside(x, y, AROUND_M) & (np.abs(z) < NEAR_M))
     if len(near):  # what is elsewhere by all views is beside a board, or clutter
         near = near[np.abs(table.local_heights(x[near], y[near], z[near])) < ALIKE_M]
-    return places[near], points.view[near]
+    return places[near], own[near]
+
+
+def _about(views: Views, place: Placement, stride: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return points (N, 3) of the object and around it, its frame, and the view (N,) that each is from."""
+    low, high = place.bounds_m + [[-AROUND_M], [AROUND_M]]
+    middle = frames.apply(frames.inverse(place.T_object_world), (low + high) / 2)
+    points = table.world_points(views, stride, middle, float(np.linalg.norm(high - low)))
+    return frames.apply(place.T_object_world, points.places_m), points.view
 
 
 def _upright(table_m: np.ndarray) -> np.ndarray:
