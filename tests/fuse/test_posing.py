@@ -64,6 +64,17 @@ def test_right_poses_stay_as_given_where_depth_is_noisy(monkeypatch):
     np.testing.assert_array_equal(found.views.T_world_cameras, views.T_world_cameras)
 
 
+def test_views_without_depth_are_left_out_and_their_poses_are_not_blamed():
+    """As of a hand-held camera that looks out of the window, or comes too near, in a third of its images."""
+    views, _ = scenes.views(shape("mug"), 24)
+    blank = [np.zeros_like(depth) if i % 3 == 0 else depth for i, depth in enumerate(views.depths_m)]
+    found = located(replace(views, depths_m=blank))
+    assert found.left_out == []
+    assert list(found.without_object) == views.names[::3]
+    (told,) = recorded.complaints(found.facts())
+    assert "if they look elsewhere all is well" in told
+
+
 def test_a_table_that_poses_split_in_two_is_no_board_once_they_are_refined():
     """As where a hand-held camera's track jumps: of half of the views the table is 7 mm higher."""
     given, _ = scenes.views(shape("mug"), 12)

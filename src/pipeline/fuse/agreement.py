@@ -62,6 +62,14 @@ def checked(
     return only(views, ~bad), left_out
 
 
+def with_depth(views: Views) -> tuple[Views, list[str]]:
+    """Return the views that hold enough depth to compare, and the names of the others: they look elsewhere, or from too near."""
+    is_empty = np.array([np.count_nonzero(depth) < POINTS for depth in views.depths_m])
+    if is_empty.all() or not is_empty.any():
+        return views, []
+    return only(views, ~is_empty), [name for name, empty in zip(views.names, is_empty, strict=True) if empty]
+
+
 def only(views: Views, kept: np.ndarray) -> Views:
     """Return the views (N,) that are kept."""
     index = np.nonzero(kept)[0]

@@ -23,10 +23,10 @@ LEAST_SEEN, LOW_SHARE = 0.85, 0.1  # of the surface higher than this share of th
 class Located:
     """Views that fit together and, where they are at hand, their planes; the table and the object on it.
 
-    left_out: names of the views that do not fit; without_object: of those that show none where poses were refined; registration:
-    how poses were found, empty where they were given; poses_off_m: by how much they were off as given, all but those of the views
-    astray, and whether they were refined; depths_too_long: by which share depths are, if that is why they were off along the
-    cameras' axes.
+    left_out: names of the views that do not fit; without_object: of those without depth, or, where poses were refined, that show
+    no object; registration: how poses were found, empty where they were given; poses_off_m: by how much they were off as given,
+    all but those of the views astray, and whether they were refined; depths_too_long: by which share depths are, if that is why
+    they were off along the cameras' axes.
     """
 
     views: Views
@@ -143,14 +143,15 @@ def located(views: Views, name: str, rng: np.random.Generator) -> Located:
     found: dict[str, Any] = {}
     if not views.T_world_cameras:
         views, found = registration.registered(views, name, rng)
+    views, empty = agreement.with_depth(views)
     views, left_out = agreement.checked(views, name, rng, are_given=not found)
     plane, place = placement.find(views, name, rng)
     seen_by = planes(views, place)
     if found:
-        return Located(views, plane, place, seen_by, left_out, found)
+        return Located(views, plane, place, seen_by, left_out, found, without_object=tuple(empty))
     aside = rng.spawn(1)[0]  # what is drawn later stays as it is
     off_m, astray = _off(views, place, seen_by, aside)
-    given = Located(views, plane, place, None, left_out, found, off_m, astray)
+    given = Located(views, plane, place, None, left_out, found, off_m, astray, without_object=tuple(empty))
     if off_m <= posing.OFF_M and not astray:
         return replace(given, seen_by=seen_by)
     del seen_by  # much, of many views
@@ -182,7 +183,7 @@ def _refined(given: Located, views: Views, unseen: list[str], name: str, rng: np
         *(views, plane, place, seen_by, given.left_out, {}, given.poses_off_m, given.astray),
         is_refined=True,
         depths_too_long=posing.too_long(given.views, views),
-        without_object=tuple(unseen),
+        without_object=(*given.without_object, *unseen),
     )
 
 
