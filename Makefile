@@ -2,7 +2,7 @@
 #
 #   make reports/roc.pdf   the figure, from whatever is in data/raw (CORES=8 make … for more than two cores)
 #   make all               everything that the workflow makes
-#   make test              lint, then every test but the long ones: a quarter of an hour
+#   make test              lint, then every test but the long ones: a quarter of an hour on two cores
 #   make test-all          lint, then every test, as CI does
 #   make docs              the documentation site, build/docs/index.html
 #   make setup             .venv alone

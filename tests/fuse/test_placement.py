@@ -259,6 +259,16 @@ def test_a_lid_is_no_turntable(tmp_path):
     assert place.bounds_m[1, 2] == pytest.approx(0.115 + placement.MARGIN_M, abs=0.003)
 
 
+@pytest.mark.parametrize(("n", "distance_m", "stride"), [(36, 0.6, 3), (12, 1.2, 2), (12, 1.6, 1)])
+def test_an_object_that_is_far_away_is_one(monkeypatch, n, distance_m, stride):
+    """Twelve views from 1.4 m saw a mug as two halves."""
+    monkeypatch.setattr(scenes, "DISTANCE_M", distance_m)
+    views, _ = scenes.views(shape("mug"), n)
+    assert placement.stride(views, table.focus(views)) == stride
+    place = placement.find(views, "mug", np.random.default_rng(2))[1]
+    assert place.bounds_m[1, 2] == pytest.approx(shape("mug").height_m + placement.MARGIN_M, abs=0.01)
+
+
 def test_points_near_a_place_are_those_of_all_that_are_near_to_it():
     views, _ = scenes.views(shape("mug"), 10)
     everything, middle = table.world_points(views), table.focus(views)

@@ -74,8 +74,9 @@ def test_poses_and_meshes_that_fuse_would_complain_of_are_told_at_once(project, 
     moved[0, 3] = 0.1
     writers.seven_scenes(scan, [*recorded[:-1], (recorded[-1][0], moved @ recorded[-1][1])])
     found = _added(project, capsys, scan)
-    assert any(said.startswith("frame-000009.depth.png: left out") for said in found["complaints"])
-    assert found["views_left_out"] == ["frame-000009.depth.png"]
+    assert any(said.startswith("frame-000009.depth.png: off by 5 mm or more") for said in found["complaints"])
+    assert found["views_left_out"] == []
+    assert found["views_without_object"] == ["frame-000009.depth.png"]
     profile = [(0.003, 0), (0.04, 0), (0.04, 0.08), (0.037, 0.08), (0.037, 0.003), (0.003, 0.003), (0.003, 0)]
     trimesh.creation.revolve(profile, sections=64).export(pot)
     main(["add", str(pot), "--name", "pot", "--project", str(project.folder)])

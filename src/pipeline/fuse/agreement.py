@@ -217,14 +217,14 @@ def _sentence(mistake: Mistake, name: str) -> str:
 def _of_scale(views: Views, sample: Sample, poses: np.ndarray, name: str) -> Mistake | None:
     """Return what explains how far views are apart whose poses are about right: focal length or unit of depth some percent off."""
     # Neighbours in a hand-held sequence stand so near to each other that they agree with any scale.
-    far = sample.pairs[-PAIRS:]
-    thinned = Sample([points[::EVERY] for points in sample.points_m], far)
+    by_chance = sample.pairs[-PAIRS:]
+    thinned = Sample([points[::EVERY] for points in sample.points_m], by_chance)
 
     def apart_m(focal: float = 1.0, depth: float = 1.0) -> float:
         return _apart_m(views, thinned, poses, focal, depth)
 
     given_m = apart_m()
-    if np.isnan(given_m):  # none that are apart show the same
+    if not np.isfinite(given_m):  # none of them show the same
         return None
     slight = (1 / SLIGHT, SLIGHT)
     if min(*map(apart_m, slight), *(apart_m(depth=factor) for factor in slight)) > NEARER * given_m:
@@ -265,7 +265,7 @@ def _apart_m(views: Views, sample: Sample, poses: np.ndarray, focal: float, dept
         measured, expected = projected(points, K[j], views.depths_m[j])
         apart.append(np.abs(measured * depth - expected)[measured > 0])
     together = np.concatenate(apart)
-    return float(np.median(together)) if len(together) else np.nan
+    return float(np.median(together)) if len(together) else np.inf
 
 
 def _of_depth(scale: float, name: str) -> Mistake:

@@ -39,7 +39,7 @@ AROUND_M = 0.15  # the table is fitted again this far around the object: depth c
 BESIDE_M, LEAST_BOARD_M, MOST_BOARD_M, BOARD_SHARE, MOST_OPEN_RAD = 0.03, 0.002, 0.012, 0.1, 0.75 * np.pi
 _ASKED = 300_000  # points at most tell heights, noise, and what is below the table: every so many
 _COMPARED = 5_000  # points of each of two objects
-# Stray pixels hit a cell once or twice; a cell of the object is hit by many views, so many times as often if it faces them.
+# Stray pixels hit a cell once or twice; one of the object by many views: where it faces them, so many times as often as that.
 _HITS_OF_NOISE, _CLEARLY = 3, 3.0
 
 
@@ -80,7 +80,7 @@ def find(
     known. A `PipelineError` says what is missing, or shows both objects when there are two.
     """
     middle = table.focus(views)
-    near = table.world_points(views, _stride(views, middle), middle, table.NEAR_M)
+    near = table.world_points(views, stride(views, middle), middle, table.NEAR_M)
     some = table.thinned(near.places_m, _ASKED)
     eyes = np.array([T[:3, 3] for T in views.T_world_cameras])
     failures: list[NoObject] = []
@@ -99,7 +99,7 @@ def find(
     raise failures[0]
 
 
-def _stride(views: Views, focus: np.ndarray) -> int:
+def stride(views: Views, focus: np.ndarray) -> int:
     """Return every how many pixels are enough to tell an object at the focus (3,) from noise: fewer where it is far away."""
     reach_m = np.median([np.linalg.norm(focus - T[:3, 3]) for T in views.T_world_cameras])
     across = CELL_M * float(np.median(views.intrinsics[:, 0, 0])) / reach_m  # pixels of a cell

@@ -15,9 +15,9 @@ from pipeline.geometry import frames
 
 # Right poses are off by 0.05 to 0.15 mm, by 0.3 in images of 512 pixels across 90°; by 0.9 mm the inside of a mug is lost.
 OFF_M = 0.00035
-# Right poses of cameras a metre away are off by 0.55 mm, and by as much once they are refined: it is depth's noise. Of poses that
-# were wrong a seventh is left at most.
-MOST_NOISE_M, NO_NEARER = 0.0008, 0.85
+# Right poses of cameras a metre away are off by 0.55 mm, of such at 1.5 m by 0.8 to 1.6, and by as much once they are refined:
+# up to this share of the spread of depth that is its noise. Of poses that were wrong a seventh is left, in scans from 0.6 m.
+NOISE_SHARE, NO_NEARER = 0.5, 0.85
 MEDIUM, FINE = 6, 3  # pixels
 AROUND_M, NEAR_M = 0.06, 0.015  # the object, and the plane: what counts as the table there
 ALIKE_M = 0.003  # around the median height in a view; beyond it is a board's edge or clutter
@@ -101,7 +101,7 @@ def too_long(given: Views, posed: Views) -> float:
 
 def shown_again(views: Views, place: Placement) -> Placement:
     """Return where the object stands, as before, with the points that the refined views show there."""
-    x, y, z = places = _about(views, place, table.STRIDE)[0].T
+    x, y, z = places = _about(views, place, placement.stride(views, table.focus(views)))[0].T
     own = (z > placement.ABOVE_M) & (z < place.bounds_m[1, 2]) & place.covers(x, y)
     return replace(place, points_m=places.T[own])
 

@@ -1,5 +1,6 @@
 """Depth images on their way to fusion: poses checked, or found where there are none; table and object found."""
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -24,9 +25,9 @@ class Located:
     """Views that fit together and, where they are at hand, their planes; the table and the object on it.
 
     left_out: names of the views that do not fit; without_object: of those without depth, or, where poses were refined, that show
-    no object; registration: how poses were found, empty where they were given; poses_off_m: by how much they were off as given,
-    all but those of the views astray, and whether they were refined; depths_too_long: by which share depths are, if that is why
-    they were off along the cameras' axes.
+    too little of the object; registration: how poses were found, empty where they were given; poses_off_m: by how much more than
+    noise they were off as given, all but those of the views astray, and whether they were refined; depths_too_long: by which share
+    depths are, if that is why they were off along the cameras' axes.
     """
 
     views: Views
@@ -77,14 +78,14 @@ def complaints(facts: dict[str, Any]) -> list[str]:
     """Return a sentence each: views that do not fit, colours that were not used, poses that are off, depth too noisy for walls."""
     told = []
     off_m, as_given = facts["poses_off_m"] or 0.0, facts["poses"] == "given"
-    refused = "fused as given, as they are too far off, or too little is seen, to refine them"
+    refused = "fused as given, as they are too far off to be refined, or too little is seen"
     done = refused if as_given else "refined on table and object"
     if off_m > posing.OFF_M:
         told.append(
             f"the poses are off by {1e3 * off_m:.1f} mm, by table and object in each view; they were {done}; "
             "calibrate the camera's pose better"
         )
-    if astray := facts.get("views_astray"):
+    if astray := facts.get("views_astray", []):
         told.append(
             f"{_named(astray)}: off by {1e3 * LEAST_ASTRAY_M:.0f} mm or more along the table; poses were {done}; correct these, "
             "or remove the views"
@@ -106,13 +107,14 @@ def complaints(facts: dict[str, Any]) -> list[str]:
     if left_out := facts.get("views_left_out"):
         cure = "remove them" if is_registered else "correct their poses or remove them"
         told.append(f"{_named(left_out)}: left out, as they do not fit the other views; {cure}")
-    if without := facts.get("views_without_object"):
-        cure = (
-            "remove them"
-            if is_registered
-            else "if they look elsewhere all is well, if not, correct their poses"
+    without = facts.get("views_without_object", [])
+    if without and is_registered:
+        told.append(f"{_named(without)}: left out, as no table with the one object was found in them; remove them")
+    elif without := [view for view in without if view not in astray]:
+        told.append(
+            f"{_named(without)}: left out, as they show too little of the object; if they look elsewhere, all is well; if not, "
+            "correct their poses, or go nearer"
         )
-        told.append(f"{_named(without)}: left out, as they show no object where the others do; {cure}")
     if facts.get("colours_differ"):
         told.append(
             "colours were not used to find poses, as their images are of another size than depth; align colour to depth"
@@ -172,13 +174,15 @@ def _refined(given: Located, views: Views, unseen: list[str], name: str, rng: np
     """Return the views with refined poses, of which some do not show the object; or as given where what was off is noise."""
     plane, place = given.plane, given.placement
     if place.raised_m > 0:  # a table that poses split in two looks like a board
-        plane, place = placement.find(views, name, rng)
+        with suppress(PipelineError):
+            plane, place = placement.find(views, name, rng)
     place = posing.shown_again(views, place)
     seen_by, off_m = planes(views, place), given.poses_off_m or 0.0
-    if not given.astray and off_m < posing.MOST_NOISE_M:
-        left_m, _ = _off(views, place, seen_by, rng)
-        if left_m > posing.NO_NEARER * off_m:
-            return replace(given, poses_off_m=float(np.sqrt(max(off_m**2 - left_m**2, 0.0))))
+    if not given.astray and off_m < posing.NOISE_SHARE * given.spread_m:
+        left_m, astray = _off(views, place, seen_by, rng)
+        if left_m > posing.NO_NEARER * off_m or astray:
+            more_m = float(np.sqrt(max(off_m**2 - left_m**2, 0.0)))
+            return replace(given, poses_off_m=min(more_m, posing.OFF_M))
     return Located(
         *(views, plane, place, seen_by, given.left_out, {}, given.poses_off_m, given.astray),
         is_refined=True,

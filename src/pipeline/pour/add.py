@@ -116,10 +116,11 @@ def _read(folder: Path, source: Path) -> dict:
             read = {"layout": found.layout, "n_views": found.n_found}
             # Finding poses takes minutes; given ones are checked at once, and with them table and object.
             if not found.T_world_cameras:
-                return {**read, "views_left_out": [], "complaints": []}
+                return {**read, "views_left_out": [], "views_without_object": [], "complaints": []}
             scan = recorded.located(found, str(folder), np.random.default_rng(0))
-            left_out = [*scan.left_out, *scan.without_object]
-            return {**read, "views_left_out": left_out, "complaints": recorded.complaints(scan.facts())}
+            facts = scan.facts()
+            left_out = {key: facts[key] for key in ("views_left_out", "views_without_object")}
+            return {**read, **left_out, "complaints": recorded.complaints(facts)}
         vertices_m, triangles, _, facts = dropped.read(found, np.random.default_rng(0))
         capacity_m3 = cavity(vertices_m, triangles, name=str(folder)).capacity_m3
     except PipelineError as error:
@@ -146,7 +147,8 @@ def _told(message: str, folder: Path, source: Path) -> str:
 def text(result: dict) -> str:
     """Return the result in words."""
     what = f"{result['n_views']} views" if result["n_views"] else f"a {result['layout']}"
-    what += f", {len(result['views_left_out'])} of them left out" if result.get("views_left_out") else ""
+    left_out = [*result.get("views_left_out", []), *result.get("views_without_object", [])]
+    what += f", {len(left_out)} of them left out" if left_out else ""
     if "capacity_m3" in result:
         what += f", {result['height_m'] * 1e3:.0f} mm high, holds {result['capacity_m3'] * 1e6:.0f} ml"
     told = [f"{result['folder']}: {what}, layout {result['layout']}"]

@@ -10,8 +10,8 @@ from pipeline.predictions import MAPPINGS, PARAMETERS
 
 PARTS = ("container", "rim", "handle")
 SCAN = (
-    *("layout", "n_views", "poses", "share_seen", "seen", "residual_m", "watertight", "views_left_out"),
-    "complaints",
+    *("layout", "n_views", "poses", "share_seen", "seen", "residual_m", "watertight"),
+    *("views_left_out", "views_without_object", "complaints"),
 )
 
 
