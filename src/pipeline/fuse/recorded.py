@@ -109,7 +109,9 @@ def complaints(facts: dict[str, Any]) -> list[str]:
         told.append(f"{_named(left_out)}: left out, as they do not fit the other views; {cure}")
     without = facts.get("views_without_object", [])
     if without and is_registered:
-        told.append(f"{_named(without)}: left out, as no table with the one object was found in them; remove them")
+        told.append(
+            f"{_named(without)}: left out, as no table with the one object was found in them; remove them"
+        )
     elif without := [view for view in without if view not in astray]:
         told.append(
             f"{_named(without)}: left out, as they show too little of the object; if they look elsewhere, all is well; if not, "
