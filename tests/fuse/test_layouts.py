@@ -336,3 +336,21 @@ def test_a_camera_of_open3d_without_a_size_is_one_of_any(recorded, tmp_path):
 )
 def test_names_of_files_that_hold_poses(name, holds_poses):
     assert bool(layouts._POSES.fullmatch(name)) == holds_poses
+
+
+@pytest.mark.parametrize(
+    ("n", "shape", "taken"), [(60, (480, 640), 60), (300, (480, 640), 200), (90, (720, 1280), 66)]
+)
+def test_of_a_long_sequence_as_many_views_are_taken_as_are_enough(tmp_path, n, shape, taken):
+    Image.fromarray(np.full(shape, 700, np.uint16)).save(tmp_path / "first.png")
+    for number in range(n):
+        (tmp_path / f"frame-{number:06d}.depth.png").hardlink_to(tmp_path / "first.png")
+        np.savetxt(tmp_path / f"frame-{number:06d}.pose.txt", np.eye(4))
+    (tmp_path / "first.png").unlink()
+    np.savetxt(
+        tmp_path / "camera-intrinsics.txt", [[600, 0, shape[1] / 2], [0, 600, shape[0] / 2], [0, 0, 1]]
+    )
+    views = layouts.read(tmp_path)
+    assert (len(views.names), views.n_found) == (taken, n)
+    assert views.names[0].startswith("frame-000000")
+    assert views.names[-1].startswith(f"frame-{n - 1:06d}")

@@ -16,7 +16,8 @@ __all__ = ["DroppedMesh", "Options", "Views", "read"]
 MESHES = (".ply", ".obj", ".stl", ".glb", ".gltf", ".off")
 CLOUDS = (".pcd", ".xyz", ".npz")
 RECORDINGS = {"7-scenes": seven_scenes, "open3d": open3d_folders, "tum": tum, "bop": bop}
-MOST_VIEWS = 200
+# Of a long sequence so many views are taken, or as many as have so many pixels together, but not fewer than suffice.
+MOST_VIEWS, MOST_PIXELS, ENOUGH_VIEWS = 200, 200 * 640 * 480, 48
 # Names of what holds poses in other layouts: views beside it were not meant to be without.
 _POSES = re.compile(
     r"(?!cameras\.txt$)((.*[^a-z])?poses?([^a-z.][^.]*)?|.*(traj(ectory)?|odom(etry)?|ground_?truth|transforms)|cameras)"
@@ -82,7 +83,7 @@ def _names(folder: Path) -> list[str]:
 
 def _views(folder: Path, layout: str, names: list[str], options: Options) -> Views:
     frames = RECORDINGS[layout].frames(folder, names, options)
-    kept = np.unique(np.linspace(0, len(frames) - 1, min(len(frames), MOST_VIEWS)).round().astype(int))
+    kept = np.unique(np.linspace(0, len(frames) - 1, _most_views(frames)).round().astype(int))
     chosen = [frames[i] for i in kept]
     poses = [frame.T_world_camera for frame in chosen if frame.T_world_camera is not None]
     if not poses and (unread := [name for name in names if _POSES.fullmatch(name)]):
@@ -112,6 +113,15 @@ def _views(folder: Path, layout: str, names: list[str], options: Options) -> Vie
         n_found=len(frames),
         colours_differ=colours_differ,
     )
+
+
+def _most_views(frames: list[Frame]) -> int:
+    """Return how many of the frames are taken: fewer of large images, which take memory and time."""
+    if len(frames) <= ENOUGH_VIEWS:
+        return len(frames)
+    first = frames[0]
+    size = files.depth(first.depth, first.depth_scale, first.K, first.where_K)[0].size
+    return min(len(frames), MOST_VIEWS, max(ENOUGH_VIEWS, MOST_PIXELS // size))
 
 
 def _for(options: Options, kept: np.ndarray, n: int, folder: Path) -> Options:
