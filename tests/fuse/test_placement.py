@@ -271,8 +271,8 @@ def test_an_object_that_is_far_away_is_one(monkeypatch, n, distance_m, stride):
 
 def test_points_near_a_place_are_those_of_all_that_are_near_to_it():
     views, _ = scenes.views(shape("mug"), 10)
-    everything, middle = table.world_points(views), table.focus(views)
-    near = table.world_points(views, around=middle, within_m=0.1)
+    middle = table.focus(views)
+    everything, near = (table.world_points(views, table.STRIDE, middle, reach_m) for reach_m in (np.inf, 0.1))
     is_near = np.sum((everything.places_m - middle) ** 2, axis=1) < 0.1**2
     assert 0 < is_near.sum() < len(is_near) / 2
     np.testing.assert_array_equal(near.places_m, everything.places_m[is_near])

@@ -152,7 +152,7 @@ def located(views: Views, name: str, rng: np.random.Generator) -> Located:
     plane, place = placement.find(views, name, rng)
     seen_by = planes(views, place)
     if found:
-        return Located(views, plane, place, seen_by, left_out, found, without_object=tuple(empty))
+        return Located(views, plane, place, seen_by, left_out, found)
     aside = rng.spawn(1)[0]  # what is drawn later stays as it is
     off_m, astray = _off(views, place, seen_by, aside)
     given = Located(views, plane, place, None, left_out, found, off_m, astray, without_object=tuple(empty))

@@ -93,19 +93,16 @@ def local_heights(x_m: np.ndarray, y_m: np.ndarray, z_m: np.ndarray) -> np.ndarr
     return np.asarray(ndimage.median(z_m, cell, np.arange(cell.max() + 1)))[cell]
 
 
-def world_points(
-    views: Views, stride: int = STRIDE, around: np.ndarray | None = None, within_m: float = np.inf
-) -> Points:
-    """Return every so many pixels of every so many rows of every view; around a point (3,), only what is so near to it."""
+def world_points(views: Views, stride: int, around: np.ndarray, within_m: float) -> Points:
+    """Return of every view every so many pixels of every so many rows, that show what is so near to a point (3,) of the world."""
     clouds = []
     for depth, K, T_world_camera in zip(views.depths_m, views.intrinsics, views.T_world_cameras, strict=True):
         v, u = np.nonzero(depth[::stride, ::stride] > 0)
         points = unprojected(stride * u, stride * v, depth[::stride, ::stride][v, u], K)
         places = frames.apply(T_world_camera, points)
-        if around is not None:  # here, as all of many large images at once are gigabytes
-            x, y, z = (places - around).T
-            places = places.take(np.flatnonzero(x * x + y * y + z * z < within_m**2), axis=0)
-        clouds.append(places)
+        x, y, z = (places - around).T
+        # View by view, as all of many large images at once are gigabytes.
+        clouds.append(places.take(np.flatnonzero(x * x + y * y + z * z < within_m**2), axis=0))
     counts = [len(cloud) for cloud in clouds]
     return Points(np.concatenate(clouds), np.repeat(np.arange(len(clouds)), counts))
 
